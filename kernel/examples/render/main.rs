@@ -1,0 +1,2 @@
+//! From a scene file to its photometric image.
+fn main() {}

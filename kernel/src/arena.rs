@@ -1,0 +1,125 @@
+//! Caller memory: how much a stage needs, and carving it into slices.
+
+use crate::error::Error;
+
+/// Every slice starts on a boundary of this many bytes (a cache line, and the widest SIMD register).
+pub const ALIGNMENT: usize = 64;
+
+/// Types for which every bit pattern of zeros is a value, and which need no drop.
+///
+/// # Safety
+/// All-zero bytes must be a valid value of the type.
+#[allow(unsafe_code)]
+pub unsafe trait Plain: Copy + Send + Sync + 'static {}
+
+macro_rules! plain {
+    ($($t:ty),*) => { $(
+        // SAFETY: numbers, and arrays of them, are valid when all their bytes are zero.
+        #[allow(unsafe_code)]
+        unsafe impl Plain for $t {}
+    )* };
+}
+plain!(u8, u16, u32, u64, i32, usize, f32, f64, glam::DVec3);
+
+// SAFETY: an array of plain values is plain.
+#[allow(unsafe_code)]
+unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
+
+/// Counts the bytes that an [`Arena`] must hold for a series of slices.
+#[derive(Clone, Copy, Debug)]
+pub struct Need {
+    bytes: usize,
+    overflow: bool,
+}
+
+impl Default for Need {
+    fn default() -> Self {
+        Need::new()
+    }
+}
+
+impl Need {
+    /// Nothing yet, but for the bytes that align the caller's memory.
+    pub const fn new() -> Self {
+        Need { bytes: ALIGNMENT - 1, overflow: false }
+    }
+
+    /// Room for `count` values of type `T`.
+    pub const fn and<T: Plain>(self, count: usize) -> Self {
+        let (size, a) = count.overflowing_mul(size_of::<T>());
+        let (padded, b) = size.overflowing_add(ALIGNMENT - 1);
+        let (bytes, c) = self.bytes.overflowing_add(padded & !(ALIGNMENT - 1));
+        Need { bytes, overflow: self.overflow | a | b | c }
+    }
+
+    /// The bytes, or an error where the count exceeds the address space.
+    pub const fn bytes(self) -> Result<usize, Error> {
+        if self.overflow { Err(Error::TooMany { what: "bytes", limit: usize::MAX }) } else { Ok(self.bytes) }
+    }
+}
+
+/// Hands out zeroed, aligned slices of the caller's memory, front to back.
+#[derive(Debug)]
+pub struct Arena<'m> {
+    rest: &'m mut [u8],
+}
+
+impl<'m> Arena<'m> {
+    /// Takes the caller's memory; an error where it is smaller than `needed` bytes.
+    pub fn new(memory: &'m mut [u8], needed: usize) -> Result<Self, Error> {
+        if memory.len() < needed {
+            return Err(Error::BufferTooSmall { needed, given: memory.len() });
+        }
+        Ok(Arena { rest: memory })
+    }
+
+    /// Bytes left, before alignment.
+    pub fn left(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// The next `count` values of type `T`, all zero.
+    #[allow(unsafe_code)]
+    pub fn take<T: Plain>(&mut self, count: usize) -> Result<&'m mut [T], Error> {
+        let skip = self.rest.as_ptr().align_offset(ALIGNMENT);
+        let needed = Need::new().and::<T>(count).bytes()?;
+        let size = (needed - (ALIGNMENT - 1)).min(count.saturating_mul(size_of::<T>()));
+        let end = match skip.checked_add(size) {
+            Some(end) if end <= self.rest.len() => end,
+            _ => return Err(Error::BufferTooSmall { needed, given: self.rest.len() }),
+        };
+        let (head, tail) = core::mem::take(&mut self.rest).split_at_mut(end);
+        self.rest = tail;
+        let bytes = &mut head[skip..];
+        bytes.fill(0);
+        // SAFETY: `bytes` is a unique borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
+        // ALIGNMENT >= align_of::<T>() (checked here), and all-zero bytes are a value of the plain type T.
+        assert!(align_of::<T>() <= ALIGNMENT);
+        Ok(unsafe { core::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast::<T>(), count) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exactly_the_bytes_asked_for_are_enough_wherever_they_start() {
+        let needed = Need::new().and::<u8>(3).and::<f64>(5).and::<u32>(0).and::<u16>(7).bytes().unwrap();
+        let mut memory = [0xffu8; 1024];
+        for start in 0..ALIGNMENT {
+            let mut arena = Arena::new(&mut memory[start..start + needed], needed).unwrap();
+            assert_eq!(arena.take::<u8>(3).unwrap(), &[0; 3]);
+            assert_eq!(arena.take::<f64>(5).unwrap(), &[0.0; 5]);
+            assert!(arena.take::<u32>(0).unwrap().is_empty());
+            let last = arena.take::<u16>(7).unwrap();
+            last.fill(0xffff);
+            assert!(arena.take::<u8>(ALIGNMENT * 2).is_err());
+        }
+        assert_eq!(
+            Arena::new(&mut memory[..needed - 1], needed).unwrap_err(),
+            Error::BufferTooSmall { needed, given: needed - 1 }
+        );
+        assert!(Need::new().and::<u64>(usize::MAX / 2).bytes().is_err());
+    }
+}

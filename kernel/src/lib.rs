@@ -1,0 +1,14 @@
+//! Photometric images of objects made of flat facets, each with a diffuse and a mirror reflectance.
+//!
+//! The method is that of Ivankin, Peteshchenkov and Pon'kin (2008): the diffuse radiance of all facets solves
+//! one linear system (eq. 12) whose matrix, the coupling, runs from facet to facet straight and by way of
+//! mirrors; a short specular chain per pixel (eq. 15) then gives the image.
+#![cfg_attr(not(feature = "std"), no_std)]
+#![deny(unsafe_code)]
+
+pub mod arena;
+pub mod error;
+pub mod math;
+pub mod simd;
+
+pub use error::{Error, Field};
