@@ -92,9 +92,9 @@ impl<'m> Arena<'m> {
         self.rest = tail;
         let bytes = &mut head[skip..];
         bytes.fill(0);
+        const { assert!(align_of::<T>() <= ALIGNMENT) };
         // SAFETY: `bytes` is a unique borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
-        // ALIGNMENT >= align_of::<T>() (checked here), and all-zero bytes are a value of the plain type T.
-        assert!(align_of::<T>() <= ALIGNMENT);
+        // ALIGNMENT >= align_of::<T>() (checked above), and all-zero bytes are a value of the plain type T.
         Ok(unsafe { core::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast::<T>(), count) })
     }
 }
