@@ -9,6 +9,8 @@
 pub mod arena;
 pub mod error;
 pub mod math;
+pub mod qmc;
+pub mod scene;
 pub mod simd;
 
 pub use error::{Error, Field};
