@@ -5,16 +5,34 @@ use crate::error::Error;
 /// Every slice starts on a boundary of this many bytes (a cache line, and the widest SIMD register).
 pub const ALIGNMENT: usize = 64;
 
-/// Types for which every bit pattern of zeros is a value, and which need no drop.
+/// Types without padding for which all bytes, whatever they hold, are a value.
 ///
 /// # Safety
-/// All-zero bytes must be a valid value of the type.
+/// Every bit pattern must be a valid value of the type, and the type must have no padding bytes.
 #[allow(unsafe_code)]
 pub unsafe trait Plain: Copy + Send + Sync + 'static {}
 
+/// Defines a `repr(C)` struct of plain fields that is plain itself.
+macro_rules! plain_struct {
+    ($(#[$meta:meta])* pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $t:ty,)* }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct $name { $($(#[$field_meta])* pub $field: $t,)* }
+        const _: () = {
+            const fn plain<T: $crate::arena::Plain>() -> usize { size_of::<T>() }
+            assert!(size_of::<$name>() == 0 $(+ plain::<$t>())*, "no padding");
+        };
+        // SAFETY: all fields are plain, and there is no padding between or after them (both checked above).
+        #[allow(unsafe_code)]
+        unsafe impl $crate::arena::Plain for $name {}
+    };
+}
+pub(crate) use plain_struct;
+
 macro_rules! plain {
     ($($t:ty),*) => { $(
-        // SAFETY: numbers, and arrays of them, are valid when all their bytes are zero.
+        // SAFETY: a number, or a vector of them, has no padding and any bit pattern is one.
         #[allow(unsafe_code)]
         unsafe impl Plain for $t {}
     )* };
@@ -99,6 +117,80 @@ impl<'m> Arena<'m> {
     }
 }
 
+/// Reads back, front to back, what an [`Arena`] over the same memory handed out.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'m> {
+    rest: &'m [u8],
+}
+
+impl<'m> View<'m> {
+    /// Reads this memory; it must start at the same address modulo [`ALIGNMENT`] as the arena's did.
+    pub fn new(memory: &'m [u8]) -> Self {
+        View { rest: memory }
+    }
+
+    /// The next `count` values of type `T`.
+    #[allow(unsafe_code)]
+    pub fn take<T: Plain>(&mut self, count: usize) -> Result<&'m [T], Error> {
+        let skip = self.rest.as_ptr().align_offset(ALIGNMENT);
+        let size = count.saturating_mul(size_of::<T>());
+        let end = skip.saturating_add(size);
+        if end > self.rest.len() {
+            return Err(Error::BufferTooSmall { needed: end, given: self.rest.len() });
+        }
+        let bytes = &self.rest[skip..end];
+        self.rest = &self.rest[end..];
+        const { assert!(align_of::<T>() <= ALIGNMENT) };
+        // SAFETY: `bytes` is a shared borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
+        // ALIGNMENT >= align_of::<T>() (checked above), and any bytes are a value of the plain type T.
+        Ok(unsafe { core::slice::from_raw_parts(bytes.as_ptr().cast::<T>(), count) })
+    }
+}
+
+/// Owned memory that starts on a boundary of [`ALIGNMENT`] bytes, wherever it is moved.
+#[cfg(feature = "std")]
+#[derive(Debug, Default)]
+pub struct Memory(std::vec::Vec<Line>);
+
+#[cfg(feature = "std")]
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Line([u8; ALIGNMENT]);
+
+#[cfg(feature = "std")]
+impl Memory {
+    /// At least `bytes` zeroed bytes.
+    pub fn new(bytes: usize) -> Memory {
+        Memory(std::vec![Line([0; ALIGNMENT]); bytes.div_ceil(ALIGNMENT)])
+    }
+
+    /// Keeps the first `bytes` and gives the rest back.
+    pub fn truncate(&mut self, bytes: usize) {
+        self.0.truncate(bytes.div_ceil(ALIGNMENT));
+        self.0.shrink_to_fit();
+    }
+
+    /// Its size in bytes.
+    pub fn size(&self) -> usize {
+        self.0.len() * ALIGNMENT
+    }
+
+    /// The bytes.
+    #[allow(unsafe_code)]
+    pub fn bytes(&self) -> &[u8] {
+        // SAFETY: lines are plain arrays of bytes without padding, contiguous in the vector.
+        unsafe { core::slice::from_raw_parts(self.0.as_ptr().cast::<u8>(), self.size()) }
+    }
+
+    /// The bytes, writable.
+    #[allow(unsafe_code)]
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        let size = self.size();
+        // SAFETY: as above, and the borrow is unique.
+        unsafe { core::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast::<u8>(), size) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -121,5 +213,17 @@ mod tests {
             Error::BufferTooSmall { needed, given: needed - 1 }
         );
         assert!(Need::new().and::<u64>(usize::MAX / 2).bytes().is_err());
+    }
+
+    #[test]
+    fn a_view_reads_what_the_arena_wrote() {
+        let mut memory = [0u8; 512];
+        let mut arena = Arena::new(&mut memory, 512).unwrap();
+        arena.take::<u16>(3).unwrap().copy_from_slice(&[1, 2, 3]);
+        arena.take::<f64>(2).unwrap().copy_from_slice(&[0.5, 1.5]);
+        let mut view = View::new(&memory);
+        assert_eq!(view.take::<u16>(3).unwrap(), &[1, 2, 3]);
+        assert_eq!(view.take::<f64>(2).unwrap(), &[0.5, 1.5]);
+        assert!(view.take::<f64>(64).is_err());
     }
 }

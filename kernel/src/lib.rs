@@ -7,10 +7,22 @@
 #![deny(unsafe_code)]
 
 pub mod arena;
+pub mod beam;
+pub mod camera;
+pub mod chain;
+pub mod coupling;
+pub mod element;
 pub mod error;
+#[cfg(feature = "std")]
+pub mod host;
+pub mod image;
+pub mod light;
 pub mod math;
+pub mod mirror;
 pub mod qmc;
+pub mod radiosity;
 pub mod scene;
+pub mod signature;
 pub mod simd;
 
 pub use error::{Error, Field};

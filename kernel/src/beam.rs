@@ -1,0 +1,177 @@
+//! Sunlight that mirrors throw onto diffuse facets.
+//!
+//! Each side of a mirror facet that faces the sun sends a share of its sunlight along mirror chains; what
+//! arrives at a diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row =
+//! facet * sides + side of the mirror, target = unknown, weight = irradiance per unit of the sun's normal
+//! irradiance. Energy is conserved: the weights times the targets' areas add up to the flux that leaves.
+//! Error of an element that receives n of the rays: about n^-3/4 of its value.
+
+use crate::bvh::Bvh;
+use crate::coupling::rows::lobe_point;
+use crate::coupling::sink::Sink;
+use crate::coupling::word::EMPTY;
+use crate::coupling::{Coupling, Record, Row};
+use crate::element::Elements;
+use crate::error::Error;
+use crate::light::Shape;
+use crate::math::Vec3;
+use crate::mirror::Surface;
+use crate::qmc::{Sequence, hash2, triangle};
+use crate::scene::{NO_MIRROR, Scene};
+use crate::sun::Sun;
+use core::ops::Range;
+
+/// What beams follow from the tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeamSettings {
+    /// Rays per unit of mirror area (scene coordinates) seen from the sun.
+    pub density: f64,
+    /// Chains end where the product of their mirrors falls below this.
+    pub cutoff: f64,
+    /// Chains meet at most this many mirrors.
+    pub mirrors: u32,
+}
+
+/// Fewest and most rays of one facet.
+const RAYS: (f64, f64) = (16.0, 65536.0);
+
+impl BeamSettings {
+    /// About `rays` rays in all, spread over the mirrors that face the sun by the area that it sees.
+    pub fn new(scene: &Scene<'_>, sun: &Sun<'_>, rays: f64, cutoff: f64, mirrors: u32) -> BeamSettings {
+        let mut area = 0.0;
+        for facet in 0..scene.facets() {
+            for side in 0..scene.sides() {
+                area += seen_area(scene, sun, facet, side);
+            }
+        }
+        BeamSettings { density: if area > 0.0 { rays / area } else { 0.0 }, cutoff, mirrors }
+    }
+}
+
+/// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
+fn seen_area(scene: &Scene<'_>, sun: &Sun<'_>, facet: usize, side: usize) -> f64 {
+    if scene.mirror(scene.material(facet)) == NO_MIRROR {
+        return 0.0;
+    }
+    scene.areas()[facet] * sun.cosine(scene.side_normal(facet, side))
+}
+
+/// Traces the beams of the mirror sides in `range` (facet * sides + side) into a block of `memory`, as
+/// [`crate::coupling::rows::fill`] does; returns the number of rows done.
+pub fn fill(
+    scene: &Scene<'_>,
+    bvh: &Bvh<'_>,
+    elements: &Elements<'_>,
+    sun: &Sun<'_>,
+    settings: &BeamSettings,
+    range: Range<usize>,
+    memory: &mut [u8],
+) -> Result<usize, Error> {
+    let given = memory.len();
+    let sink = Sink::new(&range, scene.bands(), false, memory)?;
+    let wanted = range.len();
+    let mut tracer = Tracer { scene, bvh, elements, sun, settings, sink };
+    for row in range {
+        if tracer.row(row).is_none() {
+            tracer.sink.drop_row();
+            break;
+        }
+    }
+    match tracer.sink.end() {
+        0 if wanted > 0 => Err(Error::BufferTooSmall { needed: given.saturating_mul(2), given }),
+        done => Ok(done),
+    }
+}
+
+struct Tracer<'a, 'm> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    elements: &'a Elements<'a>,
+    sun: &'a Sun<'a>,
+    settings: &'a BeamSettings,
+    sink: Sink<'m>,
+}
+
+impl Tracer<'_, '_> {
+    fn row(&mut self, row: usize) -> Option<()> {
+        let (facet, side) = (row / self.scene.sides(), row % self.scene.sides());
+        let area = seen_area(self.scene, self.sun, facet, side);
+        if area <= 0.0 {
+            self.sink.end_row(0.0, Row::default());
+            return Some(());
+        }
+        let wanted = (area * self.settings.density).clamp(RAYS.0, RAYS.1);
+        let rays = (wanted as u32).next_power_of_two();
+        let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
+        let mut stats = Row { rays, ..Row::default() };
+        for index in 0..rays {
+            self.ray(facet, side, &sequence, index, &mut stats)?;
+        }
+        self.sink.end_row(1.0 / f64::from(rays), stats);
+        Some(())
+    }
+
+    fn ray(&mut self, facet: usize, side: usize, sequence: &Sequence, index: u32, stats: &mut Row) -> Option<()> {
+        let scene = self.scene;
+        let (p, q) = sequence.pair(index, 0);
+        let (u, v) = triangle(p, q);
+        let mut surface = Surface::new(scene, facet, side, u, v);
+        let (s, t) = sequence.pair(index, 2);
+        let toward = self.sun.sample(s, t);
+        if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
+            return Some(());
+        }
+        // flux per unit of normal irradiance, the first cosine still to come
+        let (mut flux, mut word, mut arrival) = (scene.areas()[facet], EMPTY, None);
+        let mut direction = -toward;
+        loop {
+            let Some(mirror) = surface.mirror(scene) else { return Some(()) };
+            let depth = self.sink.words.get(word).depth;
+            if depth >= self.settings.mirrors {
+                return Some(());
+            }
+            word = self.sink.words.push(word, mirror.class, scene)?;
+            if self.sink.words.largest(word) < self.settings.cutoff {
+                return Some(());
+            }
+            let (s, t) = lobe_point(sequence, index, depth);
+            let (leaving, share) = surface.go_on(scene, &mirror, direction, s, t);
+            flux *= share * turned(surface.normal, leaving, arrival, mirror.lobe.is_none() && !scene.is_smooth());
+            let Some(hit) = self.bvh.closest(&surface.leave(leaving)) else { return Some(()) };
+            stats.chain_rays += 1;
+            let Some(next) = Surface::of_hit(scene, &hit) else { return Some(()) };
+            surface = next;
+            direction = leaving;
+            arrival = Some(direction);
+            let (target, _) = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
+            let area = scene.areas()[surface.facet] * self.elements.share(surface.facet);
+            self.sink.push(Record::target(target, word, flux / area, (0.0, 0.0)))?;
+        }
+    }
+}
+
+/// By how much a beam's flux changes at a mirror beside its reflectance: a mirror keeps radiance, so the flux
+/// goes with the cosine at which it leaves over that at which it came (none yet for sunlight, whose flux per
+/// normal irradiance gets its first cosine here). 1 at a flat ideal mirror.
+fn turned(normal: Vec3, leaving: Vec3, arrival: Option<Vec3>, flat: bool) -> f64 {
+    let out = leaving.dot(normal).max(0.0);
+    match arrival {
+        None => out,
+        Some(_) if flat => 1.0,
+        Some(d) => out / (-d.dot(normal)).max(1e-6),
+    }
+}
+
+/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors.
+pub fn add(beams: &Coupling<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) {
+    for (_, row) in beams.rows(0..beams.unknowns()) {
+        for record in row.targets {
+            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record), l)) {
+                let Some(mean) = table.get_mut(shape.at(record.unknown(), level)) else { continue };
+                for (band, (e, product)) in mean.iter_mut().zip(row.products(record)).enumerate() {
+                    *e += sun.irradiance(band) * product * record.weight;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,306 @@
+//! Extended form factors (eq. 12): which share of an element's cosine hemisphere each other element fills,
+//! seen straight or by way of mirrors, and where the rest of the hemisphere escapes to the sky.
+//!
+//! Rows of unknowns are computed by [`rows::fill`] into blocks of caller memory, each block a range of rows;
+//! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
+
+pub mod rows;
+pub mod sink;
+pub mod word;
+
+use crate::arena::{View, plain_struct};
+use crate::error::Error;
+use crate::math::{Vec3, fabs};
+use core::ops::Range;
+use word::Word;
+
+plain_struct! {
+    /// One term of a row. The gradient is how the weight varies over the element, in local coordinates.
+    pub struct Record {
+        /// Bit 63: an escape; bits 16..: target unknown or direction; bits 0..16: word.
+        pub key: u64,
+        /// Share of the cosine hemisphere, mean over the element.
+        pub weight: f64,
+        /// Change of the weight with the local coordinates.
+        pub gradient: [f32; 2],
+    }
+}
+
+plain_struct! {
+    /// What is known of one row.
+    pub struct Row {
+        /// First record.
+        pub start: u32,
+        /// First escape among the records.
+        pub escapes: u32,
+        /// Rays traced.
+        pub rays: u32,
+        /// Facet tests and chain rays.
+        pub chain_rays: u32,
+        /// Weight of chains cut before their end, times the largest product of their mirrors.
+        pub lost: f64,
+        /// Difference between the two halves of the row's rays, as a share of the hemisphere.
+        pub spread: f64,
+    }
+}
+
+plain_struct! {
+    /// The head of a block.
+    pub struct Head {
+        /// First unknown.
+        pub first: u64,
+        /// Rows.
+        pub rows: u64,
+        /// Records.
+        pub records: u64,
+        /// Words.
+        pub words: u64,
+        /// Word capacity.
+        pub capacity: u64,
+        /// Spectral bands.
+        pub bands: u64,
+        /// Room for rows.
+        pub room: u64,
+        /// 1 where escapes keep their directions.
+        pub directional: u64,
+    }
+}
+
+const ESCAPE: u64 = 1 << 63;
+
+/// The word of an escape that stands for light which does not arrive: its first ray met a facet.
+pub const BLOCKED: u16 = u16::MAX;
+
+impl Record {
+    /// A target seen along a word.
+    #[inline(always)]
+    pub fn target(unknown: usize, word: u16, weight: f64, gradient: (f64, f64)) -> Record {
+        Record {
+            key: (unknown as u64) << 16 | u64::from(word),
+            weight,
+            gradient: [gradient.0 as f32, gradient.1 as f32],
+        }
+    }
+
+    /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
+    #[inline(always)]
+    pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: (f64, f64)) -> Record {
+        let packed = direction.map_or(0, pack);
+        Record {
+            key: ESCAPE | packed << 16 | u64::from(word),
+            weight,
+            gradient: [gradient.0 as f32, gradient.1 as f32],
+        }
+    }
+
+    /// The word.
+    #[inline(always)]
+    pub fn word(&self) -> u16 {
+        self.key as u16
+    }
+
+    /// True for an escape to the sky.
+    #[inline(always)]
+    pub fn is_escape(&self) -> bool {
+        self.key & ESCAPE != 0
+    }
+
+    /// The target unknown.
+    #[inline(always)]
+    pub fn unknown(&self) -> usize {
+        (self.key >> 16) as usize
+    }
+
+    /// The direction of an escape.
+    #[inline(always)]
+    pub fn direction(&self) -> Vec3 {
+        unpack((self.key & !ESCAPE) >> 16)
+    }
+}
+
+const STEPS: f64 = 8_388_606.0;
+
+/// A direction on the octahedron, 23 bits a coordinate: error below 4e-7 rad.
+fn pack(d: Vec3) -> u64 {
+    let sum = fabs(d.x) + fabs(d.y) + fabs(d.z);
+    let (mut x, mut y) = (d.x / sum, d.y / sum);
+    if d.z < 0.0 {
+        let fold = |a: f64, b: f64| (1.0 - fabs(b)) * if a < 0.0 { -1.0 } else { 1.0 };
+        (x, y) = (fold(x, y), fold(y, x));
+    }
+    let step = |a: f64| ((a + 1.0) * 0.5 * STEPS + 0.5) as u64;
+    step(x) << 23 | step(y)
+}
+
+fn unpack(p: u64) -> Vec3 {
+    let back = |s: u64| (s & 0x7f_ffff) as f64 / STEPS * 2.0 - 1.0;
+    let (mut x, mut y) = (back(p >> 23), back(p));
+    let z = 1.0 - fabs(x) - fabs(y);
+    if z < 0.0 {
+        let fold = |a: f64, b: f64| (1.0 - fabs(b)) * if a < 0.0 { -1.0 } else { 1.0 };
+        (x, y) = (fold(x, y), fold(y, x));
+    }
+    Vec3::new(x, y, z).normalize()
+}
+
+/// A block of finished rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<'m> {
+    head: Head,
+    rows: &'m [Row],
+    words: &'m [Word],
+    products: &'m [f64],
+    records: &'m [Record],
+}
+
+impl<'m> Block<'m> {
+    /// Opens what [`rows::fill`] wrote.
+    pub fn open(memory: &'m [u8]) -> Result<Block<'m>, Error> {
+        let mut view = View::new(memory);
+        let head = view.take::<Head>(1)?[0];
+        let rows = view.take::<Row>(head.room as usize + 1)?;
+        let words = view.take::<Word>(head.capacity as usize)?;
+        let products = view.take::<f64>((head.capacity * head.bands) as usize)?;
+        let records = view.take::<Record>(head.records as usize)?;
+        let rows = &rows[..head.rows as usize + 1];
+        Ok(Block { head, rows, words: &words[..head.words as usize], products, records })
+    }
+
+    /// The unknowns whose rows it holds.
+    pub fn range(&self) -> Range<usize> {
+        self.head.first as usize..(self.head.first + self.head.rows) as usize
+    }
+
+    /// Bytes of the memory it was opened from that it needs, when that starts on a boundary of
+    /// [`crate::arena::ALIGNMENT`].
+    pub fn extent(&self, memory: &[u8]) -> usize {
+        let end = self.records.as_ptr_range().end as usize;
+        end.saturating_sub(memory.as_ptr() as usize)
+    }
+
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of::<Head>()
+            + size_of_val(self.rows)
+            + size_of_val(self.words)
+            + self.words.len() * self.head.bands as usize * 8
+            + size_of_val(self.records)
+    }
+}
+
+/// One row: what an element side sees.
+#[derive(Clone, Copy, Debug)]
+pub struct RowView<'m> {
+    /// Statistics.
+    pub row: Row,
+    /// Terms with a target.
+    pub targets: &'m [Record],
+    /// Terms that end in the sky, and the blocked part of the hemisphere.
+    pub escapes: &'m [Record],
+    words: &'m [Word],
+    products: &'m [f64],
+    bands: usize,
+}
+
+impl<'m> RowView<'m> {
+    /// Products of the mirror reflectances of a record's word, one per band.
+    #[inline(always)]
+    pub fn products(&self, record: &Record) -> &'m [f64] {
+        let at = record.word() as usize * self.bands;
+        self.products.get(at..at + self.bands).unwrap_or(&[])
+    }
+
+    /// Mirrors that a record's path met.
+    #[inline(always)]
+    pub fn depth(&self, record: &Record) -> u32 {
+        self.words.get(record.word() as usize).map_or(0, |w| w.depth)
+    }
+}
+
+/// All rows of a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupling<'m> {
+    blocks: &'m [Block<'m>],
+    unknowns: usize,
+}
+
+impl<'m> Coupling<'m> {
+    /// Joins blocks that cover the unknowns 0.. in order.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] where rows are missing or out of order.
+    pub fn new(blocks: &'m [Block<'m>], unknowns: usize) -> Result<Coupling<'m>, Error> {
+        let mut next = 0;
+        for block in blocks {
+            if block.range().start != next {
+                return Err(Error::Mismatch { what: "coupling block" });
+            }
+            next = block.range().end;
+        }
+        if next != unknowns {
+            return Err(Error::Mismatch { what: "coupling block" });
+        }
+        Ok(Coupling { blocks, unknowns })
+    }
+
+    /// Number of rows.
+    pub fn unknowns(&self) -> usize {
+        self.unknowns
+    }
+
+    /// The rows of a range of unknowns, in order.
+    pub fn rows(&self, range: Range<usize>) -> impl Iterator<Item = (usize, RowView<'m>)> + use<'m> {
+        let first = self.blocks.partition_point(|b| b.range().end <= range.start);
+        self.blocks[first..].iter().take_while({
+            let end = range.end;
+            move |b| b.range().start < end
+        })
+        .flat_map(move |block| {
+            let part = block.range().start.max(range.start)..block.range().end.min(range.end);
+            part.map(move |unknown| (unknown, row_of(block, unknown)))
+        })
+    }
+
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        self.blocks.iter().map(Block::memory).sum()
+    }
+
+    /// True where a new sky needs no new rays: escapes keep their directions.
+    pub fn is_directional(&self) -> bool {
+        self.blocks.iter().all(|b| b.head.directional != 0)
+    }
+}
+
+fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
+    let at = unknown - block.head.first as usize;
+    let (row, next) = (block.rows[at], block.rows[at + 1]);
+    RowView {
+        row,
+        targets: &block.records[row.start as usize..row.escapes as usize],
+        escapes: &block.records[row.escapes as usize..next.start as usize],
+        words: block.words,
+        products: block.products,
+        bands: block.head.bands as usize,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_survive_packing() {
+        for i in 0..1000 {
+            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.0021 - 1.0);
+            let s = crate::math::sqrt(1.0 - b * b);
+            let d = Vec3::new(s * crate::math::cos(a), s * crate::math::sin(a), b);
+            // two steps of 2^-22 on the octahedron, stretched by at most sqrt 3 on the sphere
+            assert!((unpack(pack(d)) - d).length() < 5e-7, "{d}");
+            assert!(pack(d) < 1 << 46);
+        }
+        for d in [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z] {
+            assert!((unpack(pack(d)) - d).length() < 1e-6);
+        }
+    }
+}

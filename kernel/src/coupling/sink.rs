@@ -1,0 +1,139 @@
+//! Writes rows of records into a block of caller memory.
+
+use super::word::{Word, Words};
+use super::{BLOCKED, Head, Record, Row};
+use crate::arena::{ALIGNMENT, Arena, Need};
+use crate::element::gradient;
+use crate::error::Error;
+use core::cmp::Ordering;
+use core::ops::Range;
+
+/// Bytes of a block that holds `rows` rows of about `records` records each.
+pub fn bytes(rows: usize, records: usize, bands: usize) -> Result<usize, Error> {
+    let all = rows.saturating_mul(records).saturating_add(1024);
+    let capacity = word_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
+    fixed(rows, capacity, bands).and::<Record>(all).bytes()
+}
+
+/// Words that a block of so many bytes has room for: 1/16 of it.
+fn word_capacity(bytes: usize, bands: usize) -> usize {
+    (bytes / 16 / (size_of::<Word>() + 8 * bands)).clamp(16, BLOCKED as usize)
+}
+
+fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
+    Need::new().and::<Head>(1).and::<Row>(rows + 1).and::<Word>(capacity).and::<f64>(capacity * bands)
+}
+
+/// The rows of a block while they are being written.
+#[derive(Debug)]
+pub struct Sink<'m> {
+    /// The words of the block.
+    pub words: Words<'m>,
+    head: &'m mut Head,
+    rows: &'m mut [Row],
+    records: &'m mut [Record],
+    start: usize,
+    used: usize,
+    done: usize,
+}
+
+impl<'m> Sink<'m> {
+    /// An empty block for the rows of `range`.
+    pub fn new(
+        range: &Range<usize>,
+        bands: usize,
+        directional: bool,
+        memory: &'m mut [u8],
+    ) -> Result<Sink<'m>, Error> {
+        let capacity = word_capacity(memory.len(), bands);
+        let needed = fixed(range.len(), capacity, bands).and::<Record>(64).bytes()?;
+        let mut arena = Arena::new(memory, needed)?;
+        let head = arena.take::<Head>(1)?;
+        let rows = arena.take::<Row>(range.len() + 1)?;
+        let words = arena.take::<Word>(capacity)?;
+        let products = arena.take::<f64>(capacity * bands)?;
+        let room = arena.left().saturating_sub(ALIGNMENT) / size_of::<Record>();
+        let records = arena.take::<Record>(room.min(u32::MAX as usize))?;
+        let head = head.first_mut().ok_or(Error::BufferTooSmall { needed, given: 0 })?;
+        *head = Head {
+            first: range.start as u64,
+            capacity: capacity as u64,
+            bands: bands as u64,
+            room: range.len() as u64,
+            directional: u64::from(directional),
+            ..Head::default()
+        };
+        Ok(Sink { words: Words::new(words, products, bands), head, rows, records, start: 0, used: 0, done: 0 })
+    }
+
+    /// Adds a record to the present row; `None` where the memory is full.
+    #[inline]
+    pub fn push(&mut self, record: Record) -> Option<()> {
+        *self.records.get_mut(self.used)? = record;
+        self.used += 1;
+        Some(())
+    }
+
+    /// Drops the present row.
+    pub fn drop_row(&mut self) {
+        self.used = self.start;
+    }
+
+    /// Ends the present row: sorts and merges its records, scales them and turns moments into gradients.
+    pub fn end_row(&mut self, scale: f64, stats: Row) {
+        let row = &mut self.records[self.start..self.used];
+        let words = &self.words;
+        row.sort_unstable_by(|a, b| order(words, a, b));
+        let kept = merge(row);
+        for record in row[..kept].iter_mut() {
+            record.weight *= scale;
+            let moments = (f64::from(record.gradient[0]) * scale, f64::from(record.gradient[1]) * scale);
+            let g = gradient(moments);
+            record.gradient = [g.0 as f32, g.1 as f32];
+        }
+        let escapes = self.start + row[..kept].partition_point(|r| !r.is_escape());
+        self.rows[self.done] = Row { start: self.start as u32, escapes: escapes as u32, ..stats };
+        self.done += 1;
+        self.start += kept;
+        self.used = self.start;
+    }
+
+    /// Ends the block and returns the number of rows in it.
+    pub fn end(self) -> usize {
+        self.rows[self.done].start = self.used as u32;
+        self.head.rows = self.done as u64;
+        self.head.records = self.used as u64;
+        self.head.words = self.words.used() as u64;
+        self.done
+    }
+}
+
+/// Adds up neighbours with the same key and returns how many records are left.
+fn merge(row: &mut [Record]) -> usize {
+    let mut kept = 0;
+    for i in 0..row.len() {
+        let record = row[i];
+        if kept > 0 && row[kept - 1].key == record.key {
+            let last = &mut row[kept - 1];
+            last.weight += record.weight;
+            last.gradient[0] += record.gradient[0];
+            last.gradient[1] += record.gradient[1];
+        } else {
+            row[kept] = record;
+            kept += 1;
+        }
+    }
+    kept
+}
+
+/// The order of a row: by target, then by word, whatever the words' numbers in this block.
+fn order(words: &Words<'_>, a: &Record, b: &Record) -> Ordering {
+    match (a.key >> 16).cmp(&(b.key >> 16)) {
+        Ordering::Equal if a.word() == b.word() => Ordering::Equal,
+        Ordering::Equal if a.word() == BLOCKED => Ordering::Greater,
+        Ordering::Equal if b.word() == BLOCKED => Ordering::Less,
+        Ordering::Equal => words.compare(a.word(), b.word()),
+        other => other,
+    }
+}
+

@@ -1,0 +1,591 @@
+//! The owning layer over the kernel, for programs with a heap and threads: it asks each stage for its bytes,
+//! hands the memory over and splits the rows over a thread pool of its own.
+//!
+//! The stages stay apart: [`Host::geometry`] once per mesh, [`Host::light`] for each light, [`Host::image`] and
+//! [`Host::signature`] for each view. A new light traces no visibility rays, a new view solves nothing.
+
+mod report;
+
+pub use report::*;
+
+use crate::arena::Memory;
+use crate::beam::{self, BeamSettings};
+use crate::bvh::Bvh;
+use crate::camera::{Camera, CameraInput};
+use crate::chain::{ChainSettings, Solved};
+use crate::coupling::rows::{RowSettings, fill};
+use crate::coupling::{Block, Coupling, sink};
+use crate::element::Elements;
+use crate::error::{Error, Field};
+use crate::image::{self, Tally, Target};
+use crate::light::{self, Light, Shape};
+use crate::math::{FRAC_1_PI, Vec3};
+use crate::radiosity::{System, bound, sweeps};
+use crate::scene::{Scene, SceneInput};
+use crate::signature::{self, Signature, Sums, View};
+use crate::simd::Isa;
+use crate::sky::{Sky, SkyInput};
+use crate::sun::{Sun, SunInput};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::time::Instant;
+use std::vec::Vec;
+
+/// What the caller asks for.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The wanted error of the image, eq. 16, relative to the reference radiance: 1e-6 to 0.1.
+    pub tolerance: f64,
+    /// Light reflected more often does not count; `None`: by tolerance.
+    pub max_bounces: Option<u32>,
+    /// Reference radiance, one value per band; `None`: from the light.
+    pub reference_radiance: Option<Vec<f64>>,
+    /// Irradiance of all facets is wanted, also of those that reflect nothing diffusely.
+    pub all_irradiances: bool,
+    /// Keep the directions of blocked and mirrored light, so that a new sky needs no rays. Where it is false,
+    /// only uniform skies can light the scene.
+    pub directional: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            tolerance: 2e-3,
+            max_bounces: None,
+            reference_radiance: None,
+            all_irradiances: false,
+            directional: true,
+        }
+    }
+}
+
+/// Threads on which all stages run.
+#[derive(Debug)]
+pub struct Host {
+    pool: rayon::ThreadPool,
+    isa: Isa,
+}
+
+/// Memory of the stages that depend on the geometry alone; give the same one again to reuse it.
+#[derive(Debug, Default)]
+pub struct GeometryMemory {
+    scene: Memory,
+    bvh: Memory,
+    elements: Memory,
+    slabs: Vec<Memory>,
+}
+
+/// Scene, tree, elements and coupling: everything that no light changes.
+#[derive(Debug)]
+pub struct Geometry<'s> {
+    scene: Scene<'s>,
+    bvh: Bvh<'s>,
+    elements: Elements<'s>,
+    blocks: Vec<Block<'s>>,
+    settings: Settings,
+    report: Report,
+}
+
+/// A scene under one light, solved.
+#[derive(Debug)]
+pub struct Lit<'g> {
+    geometry: &'g Geometry<'g>,
+    light: Light<'g>,
+    shape: Shape,
+    reference: Vec<f64>,
+    irradiance: Vec<f64>,
+    sun: Vec<f64>,
+    noise: Vec<f32>,
+    brightest: f64,
+    report: Report,
+}
+
+/// A photometric image: rows from the top, (row, column, band).
+#[derive(Debug)]
+pub struct Image {
+    /// Pixels across.
+    pub columns: usize,
+    /// Pixels down.
+    pub rows: usize,
+    /// Spectral bands.
+    pub bands: usize,
+    /// Radiance.
+    pub pixels: Vec<f32>,
+    /// The terms of eq. (11): diffuse, mirror-sky, mirror-diffuse; same shape.
+    pub components: Option<[Vec<f32>; 3]>,
+    /// What was done and how good it is.
+    pub report: Report,
+}
+
+impl Host {
+    /// A pool of so many threads; 0: as many as there are cores.
+    ///
+    /// # Errors
+    /// [`Error::TooMany`] where the system gives no threads.
+    pub fn new(threads: usize) -> Result<Host, Error> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|_| Error::TooMany { what: "threads", limit: threads })?;
+        Ok(Host { pool, isa: Isa::detect() })
+    }
+
+    /// Scene, tree, elements and coupling of a mesh.
+    pub fn geometry<'s>(
+        &self,
+        memory: &'s mut GeometryMemory,
+        input: &SceneInput<'_>,
+        settings: &Settings,
+    ) -> Result<Geometry<'s>, Error> {
+        if !(1e-6..=0.1).contains(&settings.tolerance) {
+            return Err(Error::Range { field: Field::Tolerance, band: 0, value: settings.tolerance });
+        }
+        if let Some(reference) = &settings.reference_radiance {
+            light::check_reference(reference, input.bands)?;
+        }
+        let mut report = Report { tolerance: settings.tolerance, bands: input.bands, ..Report::default() };
+        let mut clock = Clock::start();
+        let GeometryMemory { scene: scene_memory, bvh: bvh_memory, elements: element_memory, slabs } = memory;
+        *scene_memory = Memory::new(Scene::bytes(input)?);
+        let scene = Scene::new(input, scene_memory.bytes_mut())?;
+        report.facets = scene.facets();
+        report.degenerate_facets = scene.degenerate();
+        report.bytes.scene = scene.memory();
+        report.seconds.scene = clock.lap();
+        *bvh_memory = Memory::new(Bvh::bytes(scene.facets())?);
+        let bvh = Bvh::build_obvhs(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
+        report.bytes.bvh = bvh.memory();
+        report.seconds.bvh = clock.lap();
+        let divisions = std::vec![1u32; scene.facets()];
+        *element_memory = Memory::new(Elements::bytes(&divisions)?);
+        let elements = Elements::new(&scene, &divisions, element_memory.bytes_mut())?;
+        report.elements = elements.count();
+        let rows = RowSettings::new(
+            &scene,
+            settings.tolerance,
+            settings.max_bounces,
+            settings.directional,
+            settings.all_irradiances,
+        );
+        *slabs = self.blocks(elements.unknowns(), 64, scene.bands(), |range, memory| {
+            fill(&scene, &bvh, &elements, &rows, range, memory)
+        })?;
+        let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
+        let coupling = Coupling::new(&blocks, elements.unknowns())?;
+        report.count_rows(&coupling);
+        report.bytes.coupling = coupling.memory() + elements.memory();
+        report.seconds.coupling = clock.lap();
+        Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), report })
+    }
+
+    /// Fills blocks with all `rows` rows, about `records` records each, in parallel.
+    fn blocks(
+        &self,
+        rows: usize,
+        records: usize,
+        bands: usize,
+        fill: impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error> + Sync,
+    ) -> Result<Vec<Memory>, Error> {
+        // enough pieces to balance two dozen threads, large enough that a block's head does not count
+        let piece = rows.div_ceil(256).clamp(16, 1024);
+        let pieces: Vec<Range<usize>> =
+            (0..rows).step_by(piece).map(|start| start..(start + piece).min(rows)).collect();
+        let filled = self.pool.install(|| {
+            pieces.into_par_iter().map(|range| fill_piece(range, records, bands, &fill)).collect::<Result<Vec<_>, _>>()
+        })?;
+        Ok(filled.into_iter().flatten().collect())
+    }
+
+    /// The light of a scene, solved: no visibility is computed again.
+    pub fn light<'g>(
+        &self,
+        geometry: &'g Geometry<'g>,
+        sky: Option<&SkyInput<'g>>,
+        sun: Option<&SunInput<'g>>,
+    ) -> Result<Lit<'g>, Error> {
+        let (scene, elements) = (&geometry.scene, &geometry.elements);
+        let bands = scene.bands();
+        let mut report = geometry.report.clone();
+        let mut clock = Clock::start();
+        let light = Light {
+            sky: sky.map(|s| Sky::new(s, bands)).transpose()?,
+            sun: sun.map(|s| Sun::new(s, bands)).transpose()?,
+        };
+        let mut reference = std::vec![0.0; bands];
+        match &geometry.settings.reference_radiance {
+            Some(given) => reference.copy_from_slice(given),
+            None => light.reference_radiance(scene, &mut reference),
+        }
+        let coupling = geometry.coupling()?;
+        // orders of reflection are kept apart only where their number is bounded, and small
+        let levels = geometry.settings.max_bounces.filter(|&b| b <= 32).map_or(1, |b| b as usize + 1);
+        let shape = Shape { levels, bands };
+        let unknowns = elements.unknowns();
+        let mut direct = std::vec![0.0; unknowns * shape.stride()];
+        if let Some(sky) = &light.sky {
+            let accuracy = (0.05 * geometry.settings.tolerance).max(1e-9);
+            self.split(&mut direct, shape.stride(), |range, out| {
+                light::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
+            })?;
+        }
+        let mut lit_share = std::vec![0.0; unknowns];
+        if let Some(sun) = &light.sun {
+            let rays = self.split(&mut lit_share, 1, |range, out| {
+                light::sun_rows(scene, &geometry.bvh, elements, sun, range, out)
+            })?;
+            report.rays.sun += rays.iter().sum::<u64>();
+            report.rays.sun += self.beams(geometry, sun, shape, &mut direct)?;
+        }
+        report.bytes.light = 8 * (direct.len() + lit_share.len());
+        report.seconds.light = clock.lap();
+        let system = System { scene, elements, coupling: &coupling, light: &light, direct: &direct, sun: &lit_share, shape };
+        let (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
+        let brightest = brightest(&light, &reference, &radiance, bands);
+        let noise = noise(&coupling, brightest);
+        report.reference_radiance = reference.clone();
+        report.seconds.radiosity = clock.lap();
+        Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, noise, brightest, report })
+    }
+
+    /// Adds the sunlight that mirrors throw to the irradiance table; returns the rays traced.
+    fn beams(&self, geometry: &Geometry<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) -> Result<u64, Error> {
+        let scene = &geometry.scene;
+        let diffuse = scene.largest_diffuse() > 0.0 || geometry.settings.all_irradiances;
+        if scene.largest_specular() == 0.0 || !diffuse || geometry.settings.max_bounces == Some(0) {
+            return Ok(0);
+        }
+        let tolerance = geometry.settings.tolerance;
+        let rays = (500.0 / tolerance).clamp(65536.0, 1e8);
+        let mirrors = geometry.settings.max_bounces.unwrap_or(u32::MAX).min(crate::coupling::word::LONGEST as u32);
+        let settings = BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors);
+        let rows = scene.facets() * scene.sides();
+        let slabs = self.blocks(rows, 16, scene.bands(), |range, memory| {
+            beam::fill(scene, &geometry.bvh, &geometry.elements, sun, &settings, range, memory)
+        })?;
+        let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
+        let coupling = Coupling::new(&blocks, rows)?;
+        beam::add(&coupling, sun, shape, table);
+        Ok(coupling.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
+    }
+
+    /// Solves for the diffuse radiance; returns the irradiance table and the radiances.
+    fn solve(
+        &self,
+        system: &System<'_>,
+        settings: &Settings,
+        reference: &[f64],
+        report: &mut Report,
+    ) -> Result<(Vec<f64>, Vec<f64>), Error> {
+        let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
+        let mut radiance = std::vec![0.0; unknowns * bands];
+        self.split(&mut radiance, bands, |range, out| {
+            system.start(range, out);
+            Ok(())
+        })?;
+        let mut irradiance = std::vec![0.0; unknowns * system.shape.stride()];
+        if system.shape.levels == 1 {
+            report.certified.solver = self.converge(system, settings, reference, &mut radiance, report)?;
+            self.split(&mut irradiance, system.shape.stride(), |range, out| {
+                system.gather(range, 0, |_| &radiance, out)
+            })?;
+            return Ok((irradiance, radiance));
+        }
+        let mut orders = std::vec![radiance];
+        for level in 0..system.shape.levels {
+            self.split(&mut irradiance, system.shape.stride(), |range, out| {
+                system.gather(range, level, |order| &orders[order], out)
+            })?;
+            let mut next = std::vec![0.0; unknowns * bands];
+            self.split(&mut next, bands, |range, out| {
+                system.reflect(range, level, &irradiance, out);
+                Ok(())
+            })?;
+            orders.push(next);
+            report.sweeps += 1;
+        }
+        Ok((irradiance, orders.pop().unwrap_or_default()))
+    }
+
+    /// Sweeps until the bound on the error is a small part of the tolerance; returns the bound.
+    fn converge(
+        &self,
+        system: &System<'_>,
+        settings: &Settings,
+        reference: &[f64],
+        radiance: &mut Vec<f64>,
+        report: &mut Report,
+    ) -> Result<f64, Error> {
+        let bands = system.shape.bands;
+        let mut probe = std::vec![0u8; system.elements.unknowns()];
+        let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
+        let q = parts.into_iter().fold(0.0, f64::max);
+        let goal = 1e-3 * settings.tolerance;
+        let most = sweeps(q, goal).saturating_add(200).min(100_000);
+        let mut next = radiance.clone();
+        let mut error = f64::INFINITY;
+        while error > goal {
+            let changes = self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
+            let change = changes.into_iter().fold(0.0, f64::max);
+            core::mem::swap(radiance, &mut next);
+            report.sweeps += 1;
+            error = bound(change, q);
+            if report.sweeps >= most {
+                if q >= 1.0 {
+                    return Err(Error::Diverges { row_sum: q });
+                }
+                break;
+            }
+        }
+        Ok(error)
+    }
+
+    /// Runs `work` over ranges of rows, each with its part of `out` (`stride` values a row), in parallel.
+    fn split<T: Send, R: Send>(
+        &self,
+        out: &mut [T],
+        stride: usize,
+        work: impl Fn(Range<usize>, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<Vec<R>, Error> {
+        let rows = out.len() / stride.max(1);
+        let piece = rows.div_ceil(8 * self.pool.current_num_threads()).max(16);
+        self.pool.install(|| {
+            out.par_chunks_mut(piece * stride.max(1))
+                .enumerate()
+                .map(|(i, part)| work(i * piece..i * piece + part.len() / stride.max(1), part))
+                .collect()
+        })
+    }
+
+    /// The image that a camera sees of a solved scene; with `components`, the terms of eq. (11) too.
+    pub fn image(&self, lit: &Lit<'_>, camera: &CameraInput, components: bool) -> Result<Image, Error> {
+        let camera = Camera::new(camera, &lit.geometry.scene)?;
+        let mut clock = Clock::start();
+        let solved = lit.solved();
+        let (columns, rows, bands) = (camera.columns(), camera.rows(), lit.shape.bands);
+        let size = rows * columns * bands;
+        let mut pixels = std::vec![0f32; size];
+        let part = if components { size } else { 0 };
+        let mut terms = [(); 3].map(|()| std::vec![0f32; part]);
+        let tally = self.paint(&solved, &camera, &mut pixels, &mut terms)?;
+        let mut report = lit.report.clone();
+        report.bytes.image = 4 * (size + 3 * part);
+        let (signature, rays) = self.signature(lit, camera.forward())?;
+        report.signature = signature;
+        report.rays.primary = tally.primary;
+        report.rays.chain += tally.chain + rays;
+        report.seconds.image = clock.lap();
+        report.finish(&tally);
+        Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
+    }
+
+    /// Computes all rows of an image in parallel pieces.
+    fn paint(
+        &self,
+        solved: &Solved<'_>,
+        camera: &Camera,
+        pixels: &mut [f32],
+        terms: &mut [Vec<f32>; 3],
+    ) -> Result<Tally, Error> {
+        let (rows, bands) = (camera.rows(), solved.shape.bands);
+        let piece = rows.div_ceil(16 * self.pool.current_num_threads()).max(4);
+        let chunk = piece * camera.columns() * bands;
+        let scratch = image::scratch_bytes(camera, bands)?;
+        let mut parts = terms.each_mut().map(|t| t.chunks_mut(chunk));
+        let mut jobs = Vec::new();
+        for (i, image) in pixels.chunks_mut(chunk).enumerate() {
+            let components = parts.each_mut().map(|p| p.next().unwrap_or_default());
+            jobs.push((i * piece..((i + 1) * piece).min(rows), Target { image, components }));
+        }
+        let tallies = self.pool.install(|| {
+            let paint = |(range, mut target): (Range<usize>, Target<'_>)| {
+                let mut memory = Memory::new(scratch);
+                image::rows(solved, camera, range, &mut target, memory.bytes_mut())
+            };
+            jobs.into_par_iter().map(paint).collect::<Result<Vec<_>, _>>()
+        })?;
+        let mut tally = Tally::default();
+        tallies.iter().for_each(|t| tally.add(t));
+        Ok(tally)
+    }
+
+    /// What a distant observer who looks along `forward` measures, and the rays that it took.
+    ///
+    /// The background of the contrast is the sky in that direction.
+    pub fn signature(&self, lit: &Lit<'_>, forward: Vec3) -> Result<(SignatureReport, u64), Error> {
+        let solved = lit.solved();
+        let bands = lit.shape.bands;
+        let view = View::new(&solved, forward, lit.geometry.settings.signature_cells())?;
+        let mut rows = std::vec![Sums::ZERO; view.rows()];
+        self.split(&mut rows, 1, |range, out| signature::rows(&solved, &view, range, out))?;
+        let mut sums = Sums::ZERO;
+        rows.iter().for_each(|r| sums.add(r));
+        let mut background = std::vec![0.0; bands];
+        if let Some(sky) = &lit.light.sky {
+            sky.radiance(forward, &mut background);
+        }
+        let of = |band: usize| Signature::new(&sums, band, background[band]);
+        let report = SignatureReport {
+            radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
+            projected_area: sums.area,
+            mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
+            contrast: (0..bands).map(|b| of(b).contrast).collect(),
+        };
+        Ok((report, sums.rays))
+    }
+}
+
+impl Settings {
+    /// Cells along each side of the signature's view: the outline's error, n^-3/2, a quarter of the tolerance.
+    fn signature_cells(&self) -> usize {
+        (crate::math::pow(0.25 * self.tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
+    }
+}
+
+impl Geometry<'_> {
+    /// The coupling of all elements.
+    pub fn coupling(&self) -> Result<Coupling<'_>, Error> {
+        Coupling::new(&self.blocks, self.elements.unknowns())
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene<'_> {
+        &self.scene
+    }
+
+    /// The tree.
+    pub fn bvh(&self) -> &Bvh<'_> {
+        &self.bvh
+    }
+
+    /// The elements.
+    pub fn elements(&self) -> &Elements<'_> {
+        &self.elements
+    }
+
+    /// What was done so far.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+impl Lit<'_> {
+    /// The solved scene as the kernel's ray and image routines take it.
+    pub fn solved(&self) -> Solved<'_> {
+        let settings = &self.geometry.settings;
+        Solved {
+            scene: &self.geometry.scene,
+            bvh: &self.geometry.bvh,
+            elements: &self.geometry.elements,
+            light: &self.light,
+            irradiance: &self.irradiance,
+            shape: self.shape,
+            noise: &self.noise,
+            reference: &self.reference,
+            brightest: self.brightest,
+            settings: ChainSettings {
+                cutoff: 0.05 * settings.tolerance,
+                max_bounces: settings.max_bounces,
+                tolerance: settings.tolerance,
+            },
+        }
+    }
+
+    /// Reference radiance, one value per band.
+    pub fn reference(&self) -> &[f64] {
+        &self.reference
+    }
+
+    /// What was done so far.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Calls `each` with (facet, side, area, irradiance, diffuse radiance) for every side that carries a
+    /// material, by facet, then side. Irradiance is the mean over the facet of all that arrives; diffuse
+    /// radiance is emission + rho_d irradiance/pi. Degenerate facets: zeros.
+    pub fn facets(&self, mut each: impl FnMut(usize, usize, f64, &[f64], &[f64])) {
+        let (scene, elements) = (&self.geometry.scene, &self.geometry.elements);
+        let (bands, level) = (self.shape.bands, self.shape.levels - 1);
+        let (mut irradiance, mut radiance) = (std::vec![0.0; bands], std::vec![0.0; bands]);
+        for facet in 0..scene.facets() {
+            for side in 0..scene.sides() {
+                irradiance.fill(0.0);
+                for unknown in elements.unknowns_of(facet, side) {
+                    let mean = &self.irradiance[self.shape.at(unknown, level)][..bands];
+                    for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
+                        let sun = self.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
+                        *e += (m + self.sun[unknown] * sun) * elements.share(facet);
+                    }
+                }
+                let material = scene.material(facet);
+                let alive = if scene.areas()[facet] > 0.0 { 1.0 } else { 0.0 };
+                for (band, l) in radiance.iter_mut().enumerate() {
+                    irradiance[band] *= alive;
+                    *l = alive * scene.emission(material)[band]
+                        + scene.diffuse(material)[band] * FRAC_1_PI * irradiance[band];
+                }
+                each(facet, side, scene.area(facet), &irradiance, &radiance);
+            }
+        }
+    }
+}
+
+/// Fills blocks with the rows of one range, as many blocks as it takes.
+fn fill_piece(
+    range: Range<usize>,
+    records: usize,
+    bands: usize,
+    fill: &impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error>,
+) -> Result<Vec<Memory>, Error> {
+    let mut slabs = Vec::new();
+    let mut next = range.start;
+    let mut records = records;
+    while next < range.end {
+        let mut slab = Memory::new(sink::bytes(range.end - next, records, bands)?);
+        match fill(next..range.end, slab.bytes_mut()) {
+            Ok(done) => {
+                next += done;
+                let extent = Block::open(slab.bytes())?.extent(slab.bytes());
+                slab.truncate(extent);
+                slabs.push(slab);
+            }
+            Err(Error::BufferTooSmall { .. }) if records < 1 << 24 => records *= 4,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(slabs)
+}
+
+/// Largest radiance that any ray can see, relative to the reference: sky, sun disc, and diffuse radiance.
+fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64], bands: usize) -> f64 {
+    let mut largest = std::vec![0.0; bands];
+    light.largest_radiance(&mut largest);
+    if let Some(sun) = light.sun.as_ref().filter(|s| !s.is_point()) {
+        largest.iter_mut().enumerate().for_each(|(b, l)| *l = f64::max(*l, sun.disc_radiance(b)));
+    }
+    for values in radiance.chunks_exact(bands) {
+        largest.iter_mut().zip(values).for_each(|(l, &v)| *l = f64::max(*l, v));
+    }
+    let relative = largest.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(l, r)| l / r);
+    relative.fold(0.0, f64::max)
+}
+
+/// Expected error of each row's irradiance over pi: half the difference between the halves of its rays, times
+/// the radiance that is at stake.
+fn noise(coupling: &Coupling<'_>, brightest: f64) -> Vec<f32> {
+    let contrast = brightest.min(1.0);
+    coupling.rows(0..coupling.unknowns()).map(|(_, r)| (0.5 * r.row.spread * contrast) as f32).collect()
+}
+
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Clock {
+        Clock(Instant::now())
+    }
+
+    /// Seconds since the last lap.
+    fn lap(&mut self) -> f64 {
+        let seconds = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        seconds
+    }
+}

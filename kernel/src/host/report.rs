@@ -1,0 +1,141 @@
+//! What comes back with every result: how good it is, what was done, what was not needed.
+
+use crate::coupling::Coupling;
+use crate::image::Tally;
+use crate::math::sqrt;
+use std::vec::Vec;
+
+/// The keys of the program's `report.json`; seconds of reading and writing are the program's own.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Report {
+    /// The wanted error.
+    pub tolerance: f64,
+    /// Reference radiance of each band.
+    pub reference_radiance: Vec<f64>,
+    /// Expected eps of eq. 16 of this image, relative to the reference radiance.
+    pub error_estimate: f64,
+    /// True where the estimate is at most the tolerance.
+    pub tolerance_met: bool,
+    /// Bounds that hold for certain.
+    pub certified: Certified,
+    /// The largest part of the estimate.
+    pub limited_by: &'static str,
+    pub facets: usize,
+    pub degenerate_facets: usize,
+    pub bands: usize,
+    pub elements: usize,
+    pub pairs: Pairs,
+    pub rays: Rays,
+    pub sweeps: u32,
+    pub bytes: Bytes,
+    pub seconds: Seconds,
+    /// What the scene did not need, with how often.
+    pub skipped: Vec<(&'static str, u64)>,
+    pub signature: SignatureReport,
+}
+
+/// Bounds, relative to the reference radiance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Certified {
+    /// Distance of the radiances from the solution of the discrete system.
+    pub solver: f64,
+    /// What specular chains that were cut could still have brought to a pixel.
+    pub chain_tail: f64,
+    /// Weight of couplings cut by the same rule, as a share of the hemisphere.
+    pub dropped: f64,
+    /// What no bound covers.
+    pub excludes: Vec<&'static str>,
+}
+
+/// Facet pairs.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Pairs {
+    pub tested: u64,
+    pub culled: u64,
+    pub exact: u64,
+    pub sampled: u64,
+}
+
+/// Rays traced.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Rays {
+    pub visibility: u64,
+    pub sun: u64,
+    pub chain: u64,
+    pub primary: u64,
+}
+
+/// Bytes in use.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Bytes {
+    pub scene: usize,
+    pub bvh: usize,
+    pub coupling: usize,
+    pub light: usize,
+    pub image: usize,
+}
+
+/// Seconds of each stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct Seconds {
+    pub scene: f64,
+    pub bvh: f64,
+    pub coupling: f64,
+    pub light: f64,
+    pub radiosity: f64,
+    pub image: f64,
+}
+
+/// What a distant observer who looks along the camera's direction measures of the whole object.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SignatureReport {
+    /// W/sr in each band.
+    pub radiant_intensity: Vec<f64>,
+    /// In the caller's square units.
+    pub projected_area: f64,
+    /// Radiant intensity over projected area, each band.
+    pub mean_radiance: Vec<f64>,
+    /// (mean radiance - background)/background; none where the background is 0.
+    pub contrast: Vec<Option<f64>>,
+}
+
+impl Report {
+    /// Counts what the coupling's rows did.
+    pub(super) fn count_rows(&mut self, coupling: &Coupling<'_>) {
+        let (mut skipped, mut unblocked) = (0, 0);
+        for (_, row) in coupling.rows(0..coupling.unknowns()) {
+            self.rays.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
+            self.pairs.sampled += row.targets.len() as u64;
+            self.certified.dropped = self.certified.dropped.max(row.row.lost);
+            skipped += u64::from(row.row.rays == 0);
+            unblocked += u64::from(row.row.rays > 0 && row.escapes.is_empty());
+        }
+        self.pairs.tested = self.pairs.sampled;
+        for (name, count) in [("black or degenerate rows", skipped), ("unblocked rows", unblocked)] {
+            if count > 0 {
+                self.skipped.push((name, count));
+            }
+        }
+    }
+
+    /// Puts the image's part in and draws the conclusions.
+    pub(super) fn finish(&mut self, tally: &Tally) {
+        let pixels = tally.object_pixels.max(1) as f64;
+        let parts = [
+            ("visibility", sqrt(tally.noise2 / pixels)),
+            ("sampling", sqrt(tally.sampling2 / pixels)),
+            ("solver", self.certified.solver),
+            ("chain", tally.tail),
+        ];
+        self.certified.chain_tail = tally.tail;
+        self.certified.excludes = std::vec!["visibility", "light", "interpolation", "sampling"];
+        self.error_estimate = sqrt(parts.iter().map(|(_, e)| e * e).sum());
+        self.limited_by = parts.iter().fold(("nothing", 0.0), |a, &b| if b.1 > a.1 { b } else { a }).0;
+        self.tolerance_met = self.error_estimate <= self.tolerance;
+    }
+}

@@ -1,0 +1,279 @@
+//! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
+
+use crate::arena::{Arena, Need};
+use crate::camera::{Camera, Sampling};
+use crate::chain::{Solved, Terms};
+use crate::error::{Error, Field};
+use crate::math::{fabs, pow, sqrt};
+use crate::qmc::{Sequence, hash2};
+use crate::scene::MAX_BANDS;
+use core::ops::Range;
+
+/// What was done on a range of rows; ranges add up with [`Tally::add`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Pixels whose centre ray meets the object.
+    pub object_pixels: u64,
+    /// Rays through pixels.
+    pub primary: u64,
+    /// Rays of chains and toward the sun.
+    pub chain: u64,
+    /// Pixels sampled more than once.
+    pub refined: u64,
+    /// Sum over object pixels of the squared expected error from the diffuse solution.
+    pub noise2: f64,
+    /// The same of the error from sampling the pixel's area.
+    pub sampling2: f64,
+    /// Largest bound on what cut chains could still have brought.
+    pub tail: f64,
+}
+
+impl Tally {
+    /// Adds the tally of the next range.
+    pub fn add(&mut self, next: &Tally) {
+        self.object_pixels += next.object_pixels;
+        self.primary += next.primary;
+        self.chain += next.chain;
+        self.refined += next.refined;
+        self.noise2 += next.noise2;
+        self.sampling2 += next.sampling2;
+        self.tail = self.tail.max(next.tail);
+    }
+
+    /// Root mean square over the object's pixels of both errors, relative to the reference radiance.
+    pub fn estimate(&self) -> f64 {
+        if self.object_pixels == 0 {
+            return 0.0;
+        }
+        sqrt((self.noise2 + self.sampling2) / self.object_pixels as f64)
+    }
+}
+
+/// Where a range of rows is written: (row, column, band), row by row.
+#[derive(Debug)]
+pub struct Target<'o> {
+    /// Radiance.
+    pub image: &'o mut [f32],
+    /// The terms of eq. (11): diffuse, mirror-sky, mirror-diffuse; same shape, or empty.
+    pub components: [&'o mut [f32]; 3],
+}
+
+/// Bytes of scratch memory for [`rows`]: three rows of pixel centres.
+pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
+    Need::new().and::<f64>(3 * (camera.columns() + 2) * (3 * bands + 3)).bytes()
+}
+
+/// The most rays through one pixel.
+const MOST: u32 = 256;
+
+/// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
+///
+/// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre differs
+/// from none of its eight neighbours by more than the tolerance keeps its centre's value; others get 16 to 256
+/// rays, error about half the difference times n^-3/4.
+///
+/// # Errors
+/// [`Error::Range`] for rows outside the image, [`Error::Length`] for outputs of another size.
+pub fn rows(
+    solved: &Solved<'_>,
+    camera: &Camera,
+    range: Range<usize>,
+    target: &mut Target<'_>,
+    scratch: &mut [u8],
+) -> Result<Tally, Error> {
+    if range.start > range.end || range.end > camera.rows() {
+        return Err(Error::Range { field: Field::Rows, band: 0, value: range.end as f64 });
+    }
+    let bands = solved.shape.bands;
+    let expected = range.len() * camera.columns() * bands;
+    if target.image.len() != expected {
+        return Err(Error::Length { what: "image", expected, given: target.image.len() });
+    }
+    for component in &target.components {
+        if !component.is_empty() && component.len() != expected {
+            return Err(Error::Length { what: "image component", expected, given: component.len() });
+        }
+    }
+    let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
+    let width = camera.columns() + 2;
+    let stride = 3 * bands + 3;
+    let lines = arena.take::<f64>(3 * width * stride)?;
+    let mut painter =
+        Painter { solved, camera, lines, width, stride, terms: Terms::ZERO, tally: Tally::default() };
+    match camera.sampling() {
+        Sampling::Centre => painter.centres(range, target),
+        Sampling::Area => painter.areas(range, target),
+    }
+    Ok(painter.tally)
+}
+
+struct Painter<'a, 's> {
+    solved: &'a Solved<'a>,
+    camera: &'a Camera,
+    /// Three rows of pixel centres, with a column more on either side: three terms, then object, noise, tail.
+    lines: &'s mut [f64],
+    width: usize,
+    stride: usize,
+    terms: Terms,
+    tally: Tally,
+}
+
+impl Painter<'_, '_> {
+    fn centres(&mut self, range: Range<usize>, target: &mut Target<'_>) {
+        let columns = self.camera.columns();
+        for (i, row) in range.enumerate() {
+            self.line(row as isize, 0..columns as isize);
+            for j in 0..columns {
+                let at = self.slot(row as isize, j as isize);
+                self.note(at);
+                self.write(target, i * columns + j, at);
+            }
+        }
+    }
+
+    fn areas(&mut self, range: Range<usize>, target: &mut Target<'_>) {
+        let columns = self.camera.columns() as isize;
+        let (first, last) = (range.start as isize, range.end as isize);
+        if first < last {
+            self.line(first - 1, -1..columns + 1);
+            self.line(first, -1..columns + 1);
+        }
+        for row in first..last {
+            self.line(row + 1, -1..columns + 1);
+            for j in 0..columns {
+                let at = self.slot(row, j);
+                self.note(at);
+                let index = (row - first) as usize * columns as usize + j as usize;
+                let contrast = self.contrast(row, j);
+                if contrast <= self.solved.settings.tolerance {
+                    self.write(target, index, at);
+                } else {
+                    self.refine(target, index, row as usize, j as usize, contrast);
+                }
+            }
+        }
+    }
+
+    /// Where a pixel's centre stands in the lines.
+    #[inline]
+    fn slot(&self, row: isize, column: isize) -> usize {
+        (row.rem_euclid(3) as usize * self.width + (column + 1) as usize) * self.stride
+    }
+
+    /// Computes the centres of a row.
+    fn line(&mut self, row: isize, columns: Range<isize>) {
+        let bands = self.solved.shape.bands;
+        for j in columns {
+            let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
+            self.terms.clear(bands);
+            let path = self.solved.radiance(&ray, hash2(row as u32, j as u32), &mut self.terms);
+            self.tally.primary += 1;
+            self.tally.chain += u64::from(path.rays);
+            let at = self.slot(row, j);
+            let slot = &mut self.lines[at..at + self.stride];
+            slot[..bands].copy_from_slice(&self.terms.diffuse[..bands]);
+            slot[bands..2 * bands].copy_from_slice(&self.terms.mirror_sky[..bands]);
+            slot[2 * bands..3 * bands].copy_from_slice(&self.terms.mirror_diffuse[..bands]);
+            slot[3 * bands] = f64::from(u8::from(path.object));
+            slot[3 * bands + 1] = path.noise;
+            slot[3 * bands + 2] = path.tail;
+        }
+    }
+
+    /// Counts an object pixel and its expected errors.
+    fn note(&mut self, at: usize) {
+        let end = at + self.stride;
+        let (object, noise, tail) = (self.lines[end - 3], self.lines[end - 2], self.lines[end - 1]);
+        if object > 0.0 {
+            self.tally.object_pixels += 1;
+            self.tally.noise2 += noise * noise;
+            self.tally.tail = self.tally.tail.max(tail);
+        }
+    }
+
+    fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
+        let bands = self.solved.shape.bands;
+        let slot = &self.lines[at..at + 3 * bands];
+        for band in 0..bands {
+            let sum = slot[band] + slot[bands + band] + slot[2 * bands + band];
+            target.image[index * bands + band] = sum as f32;
+            for (c, component) in target.components.iter_mut().enumerate().filter(|(_, o)| !o.is_empty()) {
+                component[index * bands + band] = slot[c * bands + band] as f32;
+            }
+        }
+    }
+
+    /// Largest difference between a pixel's centre and its neighbours', relative to the reference radiance.
+    fn contrast(&self, row: isize, column: isize) -> f64 {
+        let bands = self.solved.shape.bands;
+        let value = |at: usize, band: usize| {
+            self.lines[at + band] + self.lines[at + bands + band] + self.lines[at + 2 * bands + band]
+        };
+        let centre = self.slot(row, column);
+        let mut largest: f64 = 0.0;
+        for i in row - 1..=row + 1 {
+            for j in column - 1..=column + 1 {
+                let at = self.slot(i, j);
+                for band in 0..bands {
+                    let difference = fabs(value(at, band) - value(centre, band));
+                    if difference > 0.0 {
+                        largest = largest.max(difference / self.solved.reference[band]);
+                    }
+                }
+            }
+        }
+        largest
+    }
+
+    /// The mean over a pixel's square, from as many rays as the contrast asks for.
+    fn refine(&mut self, target: &mut Target<'_>, index: usize, row: usize, column: usize, contrast: f64) {
+        let bands = self.solved.shape.bands;
+        let seed = hash2(row as u32, column as u32);
+        let sequence = Sequence::new(seed);
+        let mut sums = Terms::ZERO;
+        let (mut low, mut high) = ([f64::INFINITY; MAX_BANDS], [f64::NEG_INFINITY; MAX_BANDS]);
+        let (mut n, mut goal) = (0u32, 16u32);
+        let mut error = 0.0;
+        while n < goal {
+            let (x, y) = sequence.pair(n, 0);
+            let ray = self.camera.ray(column as f64 + x, row as f64 + y);
+            self.terms.clear(bands);
+            let path = self.solved.radiance(&ray, hash2(seed, n + 1), &mut self.terms);
+            self.tally.primary += 1;
+            self.tally.chain += u64::from(path.rays);
+            for band in 0..bands {
+                sums.diffuse[band] += self.terms.diffuse[band];
+                sums.mirror_sky[band] += self.terms.mirror_sky[band];
+                sums.mirror_diffuse[band] += self.terms.mirror_diffuse[band];
+                low[band] = low[band].min(self.terms.sum(band));
+                high[band] = high[band].max(self.terms.sum(band));
+            }
+            n += 1;
+            if n == goal {
+                let mut seen: f64 = 0.0;
+                for band in 0..bands {
+                    let d = high[band] - low[band];
+                    if d > 0.0 {
+                        seen = seen.max(d / self.solved.reference[band]);
+                    }
+                }
+                // what 16 rays have not seen of the neighbours' contrast is a corner of the pixel
+                error = 0.5 * seen.max(contrast / 16.0) * pow(f64::from(n), -0.75);
+                // a tenth of the pixels lies on edges: sqrt(10) times the tolerance there is the tolerance
+                if error > 2.0 * self.solved.settings.tolerance && goal < MOST {
+                    goal *= 2;
+                }
+            }
+        }
+        self.tally.refined += 1;
+        self.tally.sampling2 += 0.25 * error * error;
+        let share = 1.0 / f64::from(n);
+        for band in 0..bands {
+            let terms = [sums.diffuse[band], sums.mirror_sky[band], sums.mirror_diffuse[band]];
+            target.image[index * bands + band] = ((terms[0] + terms[1] + terms[2]) * share) as f32;
+            for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
+                component[index * bands + band] = (term * share) as f32;
+            }
+        }
+    }
+}

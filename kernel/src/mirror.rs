@@ -1,0 +1,120 @@
+//! Where light goes on from a facet: the point, the side, and the mirror direction.
+
+use crate::element::point;
+use crate::lobe::Lobe;
+use crate::math::{Vec3, reflect};
+use crate::ray::{Hit, Ray};
+use crate::scene::{NO_MIRROR, Scene};
+
+/// Rays start this far off their facet (scene coordinates, in which the object fills [-1, 1]): some 256 times
+/// the rounding error of a point on a facet, and a tenth of the smallest gap that is told from contact.
+pub const OFFSET: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// A point on a side of a facet that carries a material.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// The facet.
+    pub facet: usize,
+    /// 0: front, 1: back.
+    pub side: usize,
+    /// Its material.
+    pub material: usize,
+    /// Barycentric weight of corner 1.
+    pub u: f64,
+    /// Barycentric weight of corner 2.
+    pub v: f64,
+    /// The point.
+    pub point: Vec3,
+    /// Unit normal of the side.
+    pub normal: Vec3,
+}
+
+impl Surface {
+    /// The point of barycentric weights `u`, `v` on a side of a facet.
+    #[inline]
+    pub fn new(scene: &Scene<'_>, facet: usize, side: usize, u: f64, v: f64) -> Surface {
+        Surface {
+            facet,
+            side,
+            material: scene.material(facet),
+            u,
+            v,
+            point: point(&scene.corners()[facet], u, v),
+            normal: scene.side_normal(facet, side),
+        }
+    }
+
+    /// What a hit met; `None` where it is the black back of a one-sided facet.
+    #[inline]
+    pub fn of_hit(scene: &Scene<'_>, hit: &Hit) -> Option<Surface> {
+        if !hit.front && scene.sides() == 1 {
+            return None;
+        }
+        Some(Surface::new(scene, hit.facet as usize, usize::from(!hit.front), hit.u, hit.v))
+    }
+
+    /// The ray that leaves in `direction`.
+    #[inline]
+    pub fn leave(&self, direction: Vec3) -> Ray {
+        Ray {
+            origin: self.point + self.normal * OFFSET,
+            direction,
+            t_max: f64::INFINITY,
+            skip: self.facet as u32,
+        }
+    }
+
+    /// The direction in which light comes that is mirrored against `direction` (the way the ray arrived).
+    ///
+    /// Interpolated normals are bent toward the facet's own where the mirror direction would go below it.
+    #[inline]
+    pub fn mirrored(&self, scene: &Scene<'_>, direction: Vec3) -> Vec3 {
+        if !scene.is_smooth() {
+            return reflect(direction, self.normal);
+        }
+        let normal = scene.mirror_normal(self.facet, self.side, self.u, self.v);
+        let mirrored = reflect(direction, normal);
+        let height = mirrored.dot(self.normal);
+        // a mirror direction that grazes the facet: the least change that keeps it above
+        let least = 1e-3;
+        if height >= least {
+            return mirrored;
+        }
+        let lifted = mirrored + self.normal * (least - height);
+        crate::math::unit(lifted).unwrap_or(self.normal)
+    }
+
+    /// The mirror at this point, if its material is one.
+    #[inline]
+    pub fn mirror(&self, scene: &Scene<'_>) -> Option<Mirror> {
+        let class = scene.mirror(self.material);
+        if class == NO_MIRROR {
+            return None;
+        }
+        Some(Mirror { class, lobe: scene.gloss(self.material).map(Lobe::new) })
+    }
+
+    /// The direction toward the light for a ray that arrived along `direction`, and the share of the class's
+    /// mirror reflectance that applies: 1 for an ideal mirror, the lobe's albedo over rho_0 for a lobe, of
+    /// which `u`, `v` choose the ray.
+    #[inline]
+    pub fn go_on(&self, scene: &Scene<'_>, mirror: &Mirror, direction: Vec3, u: f64, v: f64) -> (Vec3, f64) {
+        let mirrored = self.mirrored(scene, direction);
+        match &mirror.lobe {
+            None => (mirrored, 1.0),
+            Some(lobe) => {
+                let cosine = mirrored.dot(self.normal);
+                (lobe.sample(mirrored, self.normal, u, v), lobe.albedo(cosine))
+            }
+        }
+    }
+}
+
+/// What mirrors at a point.
+#[derive(Clone, Debug)]
+pub struct Mirror {
+    /// Mirror class of the material.
+    pub class: u32,
+    /// The lobe, or an ideal mirror.
+    pub lobe: Option<Lobe>,
+}

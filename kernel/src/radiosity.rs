@@ -1,0 +1,186 @@
+//! Solves eq. (12) for the diffuse radiance of all elements, all bands together.
+//!
+//! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
+//! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep.
+
+use crate::coupling::Coupling;
+use crate::element::Elements;
+use crate::error::Error;
+use crate::light::{Light, Shape};
+use crate::math::{FRAC_1_PI, PI, fabs};
+use crate::scene::{MAX_BANDS, Scene};
+use core::ops::Range;
+
+/// Everything that stays fixed while the system is solved.
+#[derive(Clone, Copy, Debug)]
+pub struct System<'a> {
+    /// The scene.
+    pub scene: &'a Scene<'a>,
+    /// Its elements.
+    pub elements: &'a Elements<'a>,
+    /// Its coupling.
+    pub coupling: &'a Coupling<'a>,
+    /// The light.
+    pub light: &'a Light<'a>,
+    /// Irradiance by sky and beams, [`Shape::stride`] values an unknown.
+    pub direct: &'a [f64],
+    /// Mean of cos V of the sun, one value an unknown.
+    pub sun: &'a [f64],
+    /// Shape of `direct`.
+    pub shape: Shape,
+}
+
+impl System<'_> {
+    /// Largest of rho_d times a row's sum, over the rows of `range` and the bands: the contraction q of a sweep.
+    pub fn contraction(&self, range: Range<usize>) -> f64 {
+        let mut largest = 0.0;
+        for (unknown, row) in self.coupling.rows(range) {
+            let diffuse = self.scene.diffuse(self.material(unknown));
+            let mut sums = [0.0; MAX_BANDS];
+            for record in row.targets {
+                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
+            }
+            for (sum, rho) in sums.iter().zip(diffuse) {
+                largest = f64::max(largest, sum * rho);
+            }
+        }
+        largest
+    }
+
+    /// Radiance before any reflection of the sides of `range`: their emission.
+    pub fn start(&self, range: Range<usize>, radiance: &mut [f64]) {
+        for (unknown, out) in range.zip(radiance.chunks_exact_mut(self.shape.bands)) {
+            out.copy_from_slice(self.scene.emission(self.material(unknown)));
+        }
+    }
+
+    /// One sweep over the rows of `range`: from the radiances of all unknowns (`from`) those of the range
+    /// (`to`). Returns the largest change relative to `reference`, one value per band.
+    pub fn sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], reference: &[f64]) -> f64 {
+        let bands = self.shape.bands;
+        let mut change: f64 = 0.0;
+        let rows = self.coupling.rows(range.clone());
+        for ((unknown, row), out) in rows.zip(to.chunks_exact_mut(bands)) {
+            let material = self.material(unknown);
+            let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
+            let mut bounced = [0.0; MAX_BANDS];
+            for record in row.targets {
+                let seen = &from[record.unknown() * bands..][..bands];
+                let terms = seen.iter().zip(row.products(record));
+                bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
+            }
+            let direct = &self.direct[self.shape.at(unknown, 0)];
+            for band in 0..bands {
+                let mut irradiance = direct[band] + PI * bounced[band];
+                if let Some(sun) = &self.light.sun {
+                    irradiance += self.sun[unknown] * sun.irradiance(band);
+                }
+                let new = emission[band] + diffuse[band] * FRAC_1_PI * irradiance;
+                let old = from[unknown * bands + band];
+                if reference[band] > 0.0 {
+                    change = change.max(fabs(new - old) / reference[band]);
+                }
+                out[band] = new;
+            }
+        }
+        change
+    }
+
+    /// Irradiance of the rows of `range`, without the sun's direct part, as mean and gradients over each
+    /// element, on one level: direct light plus what all unknowns send (`radiance(level)`), written to `out`
+    /// (the part of the table that belongs to the range). Gradients below their noise are damped.
+    pub fn gather<'x>(
+        &self,
+        range: Range<usize>,
+        level: usize,
+        radiance: impl Fn(usize) -> &'x [f64],
+        out: &mut [f64],
+    ) -> Result<(), Error> {
+        let (bands, stride) = (self.shape.bands, self.shape.stride());
+        if out.len() != range.len() * stride {
+            let expected = range.len() * stride;
+            return Err(Error::Length { what: "irradiance table", expected, given: out.len() });
+        }
+        let part = self.shape.at(0, level);
+        for ((unknown, row), values) in self.coupling.rows(range).zip(out.chunks_exact_mut(stride)) {
+            let values = &mut values[part.clone()];
+            values.copy_from_slice(&self.direct[self.shape.at(unknown, level)]);
+            let mut square = [0.0; MAX_BANDS];
+            for record in row.targets {
+                let depth = row.depth(record);
+                if !self.shape.counts(depth, level) {
+                    continue;
+                }
+                let from = if self.shape.levels == 1 { 0 } else { level - depth as usize };
+                let seen = &radiance(from)[record.unknown() * bands..][..bands];
+                let (g, products) = (record.gradient.map(f64::from), row.products(record));
+                for band in 0..bands {
+                    let l = PI * products[band] * seen[band];
+                    values[band] += l * record.weight;
+                    values[bands + band] += l * g[0];
+                    values[2 * bands + band] += l * g[1];
+                    square[band] += l * l * record.weight;
+                }
+            }
+            damp(values, &square, row.row.rays, bands);
+        }
+        Ok(())
+    }
+
+    /// Diffuse radiance that the irradiance on one level makes, for the rows of `range`.
+    pub fn reflect(&self, range: Range<usize>, level: usize, irradiance: &[f64], out: &mut [f64]) {
+        let bands = self.shape.bands;
+        for (unknown, out) in range.zip(out.chunks_exact_mut(bands)) {
+            let material = self.material(unknown);
+            let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
+            let mean = &irradiance[self.shape.at(unknown, level)];
+            for band in 0..bands {
+                let sun = self.light.sun.as_ref().map_or(0.0, |s| self.sun[unknown] * s.irradiance(band));
+                out[band] = emission[band] + diffuse[band] * FRAC_1_PI * (mean[band] + sun);
+            }
+        }
+    }
+
+    fn material(&self, unknown: usize) -> usize {
+        self.scene.material(self.elements.facet_of(unknown).0)
+    }
+}
+
+/// Scales gradients down by the part of their square that noise explains (James and Stein's estimate): the
+/// mean square of a linear function with these gradients over the element is `signal`; independent rays would
+/// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net about a quarter of that.
+fn damp(values: &mut [f64], square: &[f64], rays: u32, bands: usize) {
+    if rays == 0 {
+        return;
+    }
+    for (band, &square) in square.iter().enumerate().take(bands) {
+        let (a, b) = (values[bands + band], values[2 * bands + band]);
+        let signal = (a * a + b * b - a * b) / 18.0;
+        let noise = 0.5 * square / f64::from(rays);
+        let keep = if signal > noise { 1.0 - noise / signal } else { 0.0 };
+        values[bands + band] = a * keep;
+        values[2 * bands + band] = b * keep;
+    }
+}
+
+/// Sweeps that bring the error below `goal` from a start whose error is at most 1, at contraction `q`.
+pub fn sweeps(q: f64, goal: f64) -> u32 {
+    if q <= 0.0 || goal >= 1.0 {
+        return 1;
+    }
+    if q >= 1.0 {
+        return u32::MAX;
+    }
+    (libm::ceil(crate::math::log(goal) / crate::math::log(q)) + 1.0).min(1e9) as u32
+}
+
+/// Bound on the error of all radiances after a sweep that changed them by at most `change`, at contraction `q`.
+pub fn bound(change: f64, q: f64) -> f64 {
+    if change == 0.0 {
+        0.0
+    } else if q < 1.0 {
+        change * q / (1.0 - q)
+    } else {
+        f64::INFINITY
+    }
+}
