@@ -7,8 +7,10 @@
 #![deny(unsafe_code)]
 
 pub mod arena;
+pub mod bvh;
 pub mod error;
 pub mod math;
+pub mod ray;
 pub mod simd;
 
 pub use error::{Error, Field};
