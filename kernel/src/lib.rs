@@ -8,6 +8,7 @@
 
 pub mod arena;
 pub mod beam;
+pub mod bvh;
 pub mod camera;
 pub mod chain;
 pub mod coupling;
@@ -17,12 +18,17 @@ pub mod error;
 pub mod host;
 pub mod image;
 pub mod light;
+pub mod lobe;
 pub mod math;
 pub mod mirror;
 pub mod qmc;
+pub mod quadrature;
 pub mod radiosity;
+pub mod ray;
 pub mod scene;
 pub mod signature;
 pub mod simd;
+pub mod sky;
+pub mod sun;
 
 pub use error::{Error, Field};

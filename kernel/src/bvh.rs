@@ -1,0 +1,219 @@
+//! The bounding volume hierarchy: nodes of eight boxes, leaves of four facets, in caller memory.
+//!
+//! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
+//! reads it. Hits are those of [`ray::intersect`](crate::ray::intersect) over all facets, bit for bit: the least
+//! `t`, ties to the lowest facet index, whatever the builder and the instruction set.
+
+mod build;
+mod collapse;
+#[cfg(feature = "std")]
+mod obvhs;
+mod traverse;
+
+use crate::arena::{Arena, Need};
+use crate::error::Error;
+use crate::math::{Vec3, fabs};
+use crate::ray::{self, Hit, Ray};
+use crate::simd::Isa;
+
+use build::{Binary, Facets};
+
+/// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
+/// and high is minus infinity.
+type Boxes = [[[f32; 8]; 2]; 3];
+
+/// Four facets: corner 0, 1, 2 and the normal, then axis, then facet.
+type Packet = [[[f64; 4]; 3]; 4];
+
+/// A child with this bit is a leaf: the packet's index, and [`PAIR`] where the leaf goes on in the next packet.
+const LEAF: u32 = 1 << 31;
+const PAIR: u32 = 1 << 30;
+
+/// No facet: fills the lanes of packets that hold none.
+const NONE: u32 = u32::MAX;
+
+/// Facets a leaf holds at most, and the width of a packet.
+const LANES: usize = 4;
+
+/// Facet count is kept below this, so that lane and node numbers fit beside the bits of a child.
+const MOST: usize = 1 << 28;
+
+/// Coordinates up to this keep every product of the traversal finite in f32.
+const LARGEST: f64 = (1u64 << 40) as f64;
+
+/// A largest coordinate from here on keeps them clear of f32's subnormal numbers.
+const SMALLEST: f64 = 1.0 / LARGEST;
+
+/// A mesh made ready for rays. Holds nothing but slices of the caller's memory.
+///
+/// Queries take `&self` and may run at the same time on any number of threads.
+#[derive(Clone, Copy, Debug)]
+pub struct Bvh<'m> {
+    boxes: &'m [Boxes],
+    children: &'m [[u32; 8]],
+    packets: &'m [Packet],
+    facets: &'m [[u32; LANES]],
+    /// Levels of nodes: bounds the stack of a traversal.
+    levels: usize,
+    low: Vec3,
+    high: Vec3,
+    isa: Isa,
+}
+
+/// How many of each thing `facets` facets can need.
+struct Size {
+    nodes: usize,
+    packets: usize,
+    /// Bytes that first hold the binary tree and then the packets.
+    shared: usize,
+}
+
+impl Size {
+    fn of(facets: usize) -> Result<Size, Error> {
+        if facets >= MOST {
+            return Err(Error::TooMany { what: "facets", limit: MOST - 1 });
+        }
+        // A node of fewer than eight children has leaves alone and at least five facets (smaller subtrees become
+        // one leaf). Let w of N nodes be such. Nodes other than the root, and leaves outside the w, are children of
+        // the N - w full nodes: 8 (N - w) = N - 1 + l with 5 w + l <= n, hence N <= (n + 3 w)/7 <= 8 n/35.
+        let nodes = facets * 8 / 35 + 2;
+        // Leaves start on a packet's boundary as long as that leaves at most n/2 lanes empty.
+        let packets = (facets + facets / 2).div_ceil(LANES);
+        let tree = Binary::need(facets).bytes()?;
+        let shared = tree.max(Need::new().and::<Packet>(packets).bytes()?);
+        Ok(Size { nodes, packets, shared })
+    }
+
+    fn bytes(&self) -> Result<usize, Error> {
+        Need::new()
+            .and::<Boxes>(self.nodes)
+            .and::<[u32; 8]>(self.nodes)
+            .and::<[u32; LANES]>(self.packets)
+            .and::<u8>(self.shared)
+            .bytes()
+    }
+}
+
+impl<'m> Bvh<'m> {
+    /// Bytes of memory that a tree over `facets` facets needs at most, building included: some 220 a facet.
+    ///
+    /// # Errors
+    /// [`Error::TooMany`] for 2^28 facets and more.
+    pub fn bytes(facets: usize) -> Result<usize, Error> {
+        Size::of(facets)?.bytes()
+    }
+
+    /// Builds the tree with the kernel's own builder: no heap, binned surface area heuristic.
+    ///
+    /// `corners[i]` are facet i's, recentred and scaled to about [-1, 1]; `areas[i]` is 0 for a degenerate facet,
+    /// which no ray meets. `memory` holds at least [`Bvh::bytes`] bytes, of any content and alignment.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`]; [`Error::TooMany`]; [`Error::Length`] where there is not one area per facet;
+    /// [`Error::Extent`] where a coordinate is not finite or the largest magnitude outside 2^-40..=2^40.
+    pub fn build(
+        corners: &[[Vec3; 3]],
+        areas: &[f64],
+        isa: Isa,
+        memory: &'m mut [u8],
+    ) -> Result<Bvh<'m>, Error> {
+        Bvh::build_with(corners, areas, isa, memory, build::binned)
+    }
+
+    /// Builds the tree with the builder of the crate obvhs (PLOC with reinsertion), which takes heap of its own while
+    /// it builds. Arguments and errors as for [`Bvh::build`].
+    #[cfg(feature = "std")]
+    pub fn build_obvhs(
+        corners: &[[Vec3; 3]],
+        areas: &[f64],
+        isa: Isa,
+        memory: &'m mut [u8],
+    ) -> Result<Bvh<'m>, Error> {
+        Bvh::build_with(corners, areas, isa, memory, obvhs::ploc)
+    }
+
+    fn build_with(
+        corners: &[[Vec3; 3]],
+        areas: &[f64],
+        isa: Isa,
+        memory: &'m mut [u8],
+        builder: fn(&Facets, &mut Binary),
+    ) -> Result<Bvh<'m>, Error> {
+        if areas.len() != corners.len() {
+            return Err(Error::Length { what: "areas", expected: corners.len(), given: areas.len() });
+        }
+        let size = Size::of(corners.len())?;
+        let mut arena = Arena::new(memory, size.bytes()?)?;
+        let (low, high) = extent(corners, areas)?;
+        let boxes = arena.take::<Boxes>(size.nodes)?;
+        let children = arena.take::<[u32; 8]>(size.nodes)?;
+        let facets = arena.take::<[u32; LANES]>(size.packets)?;
+        let shared = arena.take::<u8>(size.shared)?;
+        let made = {
+            let mut scratch = Arena::new(&mut *shared, size.shared)?;
+            let (prepared, mut tree) = Binary::prepare(corners, areas, &mut scratch)?;
+            builder(&prepared, &mut tree);
+            collapse::collapse(&tree, boxes, children, facets)
+        };
+        let (facets, _) = facets.split_at(made.packets.min(facets.len()));
+        let packets = Arena::new(shared, 0)?.take::<Packet>(facets.len())?;
+        for (packet, lanes) in packets.iter_mut().zip(facets) {
+            fill(packet, lanes, corners);
+        }
+        let (boxes, _) = boxes.split_at(made.nodes.min(boxes.len()));
+        let (children, _) = children.split_at(boxes.len());
+        Ok(Bvh { boxes, children, packets, facets, levels: made.levels, low, high, isa })
+    }
+
+    /// The first facet that the ray meets: least t with `0 < t < t_max`, then lowest index.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        traverse::closest(self, ray)
+    }
+
+    /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        traverse::occluded(self, ray)
+    }
+
+    /// The lowest and the highest coordinates of the facets that rays can meet; zeros where there is none.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        (self.low, self.high)
+    }
+
+    /// Bytes in use once built, at most [`Bvh::bytes`].
+    pub fn memory(&self) -> usize {
+        size_of_val(self.boxes)
+            + size_of_val(self.children)
+            + size_of_val(self.facets)
+            + size_of_val(self.packets)
+    }
+}
+
+/// The box of all facets of nonzero area.
+fn extent(corners: &[[Vec3; 3]], areas: &[f64]) -> Result<(Vec3, Vec3), Error> {
+    let mut bounds = None;
+    for &corner in corners.iter().zip(areas).filter(|(_, area)| **area != 0.0).flat_map(|(facet, _)| facet) {
+        if corner.is_nan() || corner.to_array().iter().any(|&x| fabs(x) > LARGEST) {
+            return Err(Error::Extent);
+        }
+        let (low, high) = bounds.unwrap_or((corner, corner));
+        bounds = Some((corner.min(low), corner.max(high)));
+    }
+    let Some((low, high)) = bounds else { return Ok((Vec3::ZERO, Vec3::ZERO)) };
+    if low.abs().max(high.abs()).max_element() < SMALLEST { Err(Error::Extent) } else { Ok((low, high)) }
+}
+
+/// Copies the facets of one packet, with their normals, into its lanes. Lanes without a facet are NaN, which is
+/// inside of nothing.
+fn fill(packet: &mut Packet, lanes: &[u32; LANES], corners: &[[Vec3; 3]]) {
+    *packet = [[[f64::NAN; LANES]; 3]; 4];
+    for (lane, &facet) in lanes.iter().enumerate() {
+        let Some(facet) = corners.get(facet as usize) else { continue };
+        let [a, b, c] = *facet;
+        for (rows, vector) in packet.iter_mut().zip([a, b, c, ray::normal(facet)]) {
+            for (row, x) in rows.iter_mut().zip(vector.to_array()) {
+                row[lane] = x;
+            }
+        }
+    }
+}
