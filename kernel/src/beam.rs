@@ -111,7 +111,14 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    fn ray(&mut self, facet: usize, side: usize, sequence: &Sequence, index: u32, stats: &mut Row) -> Option<()> {
+    fn ray(
+        &mut self,
+        facet: usize,
+        side: usize,
+        sequence: &Sequence,
+        index: u32,
+        stats: &mut Row,
+    ) -> Option<()> {
         let scene = self.scene;
         let (p, q) = sequence.pair(index, 0);
         let (u, v) = triangle(p, q);
@@ -136,7 +143,8 @@ impl Tracer<'_, '_> {
             }
             let (s, t) = lobe_point(sequence, index, depth);
             let (leaving, share) = surface.go_on(scene, &mirror, direction, s, t);
-            flux *= share * turned(surface.normal, leaving, arrival, mirror.lobe.is_none() && !scene.is_smooth());
+            flux *=
+                share * turned(surface.normal, leaving, arrival, mirror.lobe.is_none() && !scene.is_smooth());
             let Some(hit) = self.bvh.closest(&surface.leave(leaving)) else { return Some(()) };
             stats.chain_rays += 1;
             let Some(next) = Surface::of_hit(scene, &hit) else { return Some(()) };

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Field};
 use crate::math::{FRAC_PI_2, Vec3, tan, unit};
-use crate::ray::{NO_FACET, Ray};
+use crate::ray::Ray;
 use crate::scene::Scene;
 
 /// How the image is projected.
@@ -78,7 +78,8 @@ impl Camera {
         };
         let eye = finite(Field::CameraEye, input.eye)?;
         let target = finite(Field::CameraTarget, input.target)?;
-        let up = unit(finite(Field::CameraUp, input.up)?).ok_or(Error::Direction { field: Field::CameraUp })?;
+        let up =
+            unit(finite(Field::CameraUp, input.up)?).ok_or(Error::Direction { field: Field::CameraUp })?;
         let forward = unit(target - eye).ok_or(Error::CameraFrame { field: Field::CameraTarget })?;
         let across = forward.cross(up);
         // below this the direction of `across` is rounding noise
@@ -130,7 +131,7 @@ impl Camera {
             let d = self.forward + aside;
             (self.eye, unit(d).unwrap_or(self.forward))
         };
-        Ray { origin, direction, t_max: f64::INFINITY, skip: NO_FACET }
+        Ray::new(origin, direction)
     }
 
     /// Viewing direction of the image's middle.

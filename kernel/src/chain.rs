@@ -137,7 +137,9 @@ impl Solved<'_> {
                 *through *= rho;
                 largest = f64::max(largest, *through);
             }
-            if largest * self.brightest < self.settings.cutoff || leg.mirrors as usize >= crate::coupling::word::LONGEST {
+            if largest * self.brightest < self.settings.cutoff
+                || leg.mirrors as usize >= crate::coupling::word::LONGEST
+            {
                 path.tail += largest * self.brightest;
                 return;
             }
@@ -171,13 +173,21 @@ impl Solved<'_> {
     }
 
     /// n equal-energy rays of the visible lobe.
-    fn branch(&self, leg: &Leg, surface: &Surface, mirror: &Mirror, sample: u32, terms: &mut Terms, path: &mut Path) {
+    fn branch(
+        &self,
+        leg: &Leg,
+        surface: &Surface,
+        mirror: &Mirror,
+        sample: u32,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
         let Some(lobe) = &mirror.lobe else { return };
         let n = self.lobe_rays(surface.material);
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
         let share = lobe.albedo(mirrored.dot(surface.normal)) / f64::from(n);
         for i in 0..n {
-            let direction = lobe.ray(i, n, mirrored, surface.normal);
+            let direction = lobe.ray(i as usize, n as usize, mirrored, surface.normal);
             let mut through = leg.through;
             through[..self.shape.bands].iter_mut().for_each(|t| *t *= share);
             let next = Leg { ray: surface.leave(direction), through, mirrors: leg.mirrors, lobe: true };
@@ -268,18 +278,22 @@ impl Solved<'_> {
             return if shadow { 0.0 } else { cosine };
         }
         let sequence = Sequence::new(hash2(sample, 0x0d15_c000));
-        let (mut lit, mut count, mut goal) = (0u32, 0u32, 8u32);
+        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0u32, 8u32);
         while count < goal {
             let (u, v) = sequence.pair(count, 0);
             let toward = sun.sample(u, v);
-            lit += u32::from(toward.dot(surface.normal) > 0.0 && !self.bvh.occluded(&surface.leave(toward)));
+            let share = sun.share(toward, surface.normal);
             count += 1;
-            if count == 8 && lit != 0 && lit != 8 {
+            if share > 0.0 {
+                all += share;
+                path.rays += 1;
+                lit += if self.bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
+            }
+            if count == 8 && lit != 0.0 && lit != all {
                 goal = 64;
             }
         }
-        path.rays += count;
-        cosine * f64::from(lit) / f64::from(count)
+        if all > 0.0 { cosine * (lit / all) } else { 0.0 }
     }
 
     /// The sun in a lobe, evaluated directly: E q(sun, view) V.

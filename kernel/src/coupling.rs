@@ -178,6 +178,11 @@ impl<'m> Block<'m> {
         end.saturating_sub(memory.as_ptr() as usize)
     }
 
+    /// Records in it.
+    pub fn records(&self) -> usize {
+        self.records.len()
+    }
+
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         size_of::<Head>()
@@ -251,14 +256,16 @@ impl<'m> Coupling<'m> {
     /// The rows of a range of unknowns, in order.
     pub fn rows(&self, range: Range<usize>) -> impl Iterator<Item = (usize, RowView<'m>)> + use<'m> {
         let first = self.blocks.partition_point(|b| b.range().end <= range.start);
-        self.blocks[first..].iter().take_while({
-            let end = range.end;
-            move |b| b.range().start < end
-        })
-        .flat_map(move |block| {
-            let part = block.range().start.max(range.start)..block.range().end.min(range.end);
-            part.map(move |unknown| (unknown, row_of(block, unknown)))
-        })
+        self.blocks[first..]
+            .iter()
+            .take_while({
+                let end = range.end;
+                move |b| b.range().start < end
+            })
+            .flat_map(move |block| {
+                let part = block.range().start.max(range.start)..block.range().end.min(range.end);
+                part.map(move |unknown| (unknown, row_of(block, unknown)))
+            })
     }
 
     /// Bytes in use.

@@ -165,7 +165,9 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        *slabs = self.blocks(elements.unknowns(), 64, scene.bands(), |range, memory| {
+        // a ray leaves a record where it is blocked and one at each facet that it meets
+        let unmerged = 4 * rows.rays as usize;
+        *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
             fill(&scene, &bvh, &elements, &rows, range, memory)
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
@@ -176,11 +178,11 @@ impl Host {
         Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), report })
     }
 
-    /// Fills blocks with all `rows` rows, about `records` records each, in parallel.
+    /// Fills blocks with all `rows` rows, each of some `unmerged` records while it grows, in parallel.
     fn blocks(
         &self,
         rows: usize,
-        records: usize,
+        unmerged: usize,
         bands: usize,
         fill: impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error> + Sync,
     ) -> Result<Vec<Memory>, Error> {
@@ -189,7 +191,10 @@ impl Host {
         let pieces: Vec<Range<usize>> =
             (0..rows).step_by(piece).map(|start| start..(start + piece).min(rows)).collect();
         let filled = self.pool.install(|| {
-            pieces.into_par_iter().map(|range| fill_piece(range, records, bands, &fill)).collect::<Result<Vec<_>, _>>()
+            pieces
+                .into_par_iter()
+                .map(|range| fill_piece(range, unmerged, bands, &fill))
+                .collect::<Result<Vec<_>, _>>()
         })?;
         Ok(filled.into_iter().flatten().collect())
     }
@@ -236,7 +241,15 @@ impl Host {
         }
         report.bytes.light = 8 * (direct.len() + lit_share.len());
         report.seconds.light = clock.lap();
-        let system = System { scene, elements, coupling: &coupling, light: &light, direct: &direct, sun: &lit_share, shape };
+        let system = System {
+            scene,
+            elements,
+            coupling: &coupling,
+            light: &light,
+            direct: &direct,
+            sun: &lit_share,
+            shape,
+        };
         let (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
         let brightest = brightest(&light, &reference, &radiance, bands);
         let noise = noise(&coupling, brightest);
@@ -246,7 +259,13 @@ impl Host {
     }
 
     /// Adds the sunlight that mirrors throw to the irradiance table; returns the rays traced.
-    fn beams(&self, geometry: &Geometry<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) -> Result<u64, Error> {
+    fn beams(
+        &self,
+        geometry: &Geometry<'_>,
+        sun: &Sun<'_>,
+        shape: Shape,
+        table: &mut [f64],
+    ) -> Result<u64, Error> {
         let scene = &geometry.scene;
         let diffuse = scene.largest_diffuse() > 0.0 || geometry.settings.all_irradiances;
         if scene.largest_specular() == 0.0 || !diffuse || geometry.settings.max_bounces == Some(0) {
@@ -254,10 +273,11 @@ impl Host {
         }
         let tolerance = geometry.settings.tolerance;
         let rays = (500.0 / tolerance).clamp(65536.0, 1e8);
-        let mirrors = geometry.settings.max_bounces.unwrap_or(u32::MAX).min(crate::coupling::word::LONGEST as u32);
+        let mirrors =
+            geometry.settings.max_bounces.unwrap_or(u32::MAX).min(crate::coupling::word::LONGEST as u32);
         let settings = BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors);
         let rows = scene.facets() * scene.sides();
-        let slabs = self.blocks(rows, 16, scene.bands(), |range, memory| {
+        let slabs = self.blocks(rows, 1024, scene.bands(), |range, memory| {
             beam::fill(scene, &geometry.bvh, &geometry.elements, sun, &settings, range, memory)
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
@@ -322,7 +342,8 @@ impl Host {
         let mut next = radiance.clone();
         let mut error = f64::INFINITY;
         while error > goal {
-            let changes = self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
+            let changes =
+                self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
             let change = changes.into_iter().fold(0.0, f64::max);
             core::mem::swap(radiance, &mut next);
             report.sweeps += 1;
@@ -531,23 +552,25 @@ impl Lit<'_> {
 /// Fills blocks with the rows of one range, as many blocks as it takes.
 fn fill_piece(
     range: Range<usize>,
-    records: usize,
+    mut unmerged: usize,
     bands: usize,
     fill: &impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error>,
 ) -> Result<Vec<Memory>, Error> {
     let mut slabs = Vec::new();
     let mut next = range.start;
-    let mut records = records;
+    let mut records = 64;
     while next < range.end {
-        let mut slab = Memory::new(sink::bytes(range.end - next, records, bands)?);
+        let mut slab = Memory::new(sink::bytes(range.end - next, records, unmerged, bands)?);
         match fill(next..range.end, slab.bytes_mut()) {
             Ok(done) => {
                 next += done;
-                let extent = Block::open(slab.bytes())?.extent(slab.bytes());
+                let block = Block::open(slab.bytes())?;
+                records = 64.max(block.records() / done + 16);
+                let extent = block.extent(slab.bytes());
                 slab.truncate(extent);
                 slabs.push(slab);
             }
-            Err(Error::BufferTooSmall { .. }) if records < 1 << 24 => records *= 4,
+            Err(Error::BufferTooSmall { .. }) if unmerged < 1 << 28 => unmerged *= 4,
             Err(error) => return Err(error),
         }
     }

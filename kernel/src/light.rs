@@ -189,7 +189,7 @@ pub fn sun_rows(
             continue;
         }
         let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
-        let (mut lit, mut count, mut goal) = (0, 0, SUN_POINTS.0);
+        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
         while count < goal {
             let (p, q) = sequence.pair(count, 0);
             let (a, b) = triangle(p, q);
@@ -197,14 +197,18 @@ pub fn sun_rows(
             let (s, t) = sequence.pair(count, 2);
             let toward = sun.sample(s, t);
             let surface = Surface::new(scene, facet, side, u, v);
-            lit += u32::from(toward.dot(normal) > 0.0 && !bvh.occluded(&surface.leave(toward)));
+            let share = sun.share(toward, normal);
             count += 1;
-            if count == SUN_POINTS.0 && lit != 0 && lit != count {
+            if share > 0.0 {
+                all += share;
+                lit += if bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
+            }
+            if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
                 goal = SUN_POINTS.1;
             }
         }
         rays += u64::from(count);
-        *value = cosine * f64::from(lit) / f64::from(count);
+        *value = if all > 0.0 { cosine * (lit / all) } else { 0.0 };
     }
     Ok(rays)
 }

@@ -91,7 +91,7 @@ impl Surface {
         if class == NO_MIRROR {
             return None;
         }
-        Some(Mirror { class, lobe: scene.gloss(self.material).map(Lobe::new) })
+        Some(Mirror { class, lobe: scene.gloss(self.material).and_then(|ratio| Lobe::new(ratio).ok()) })
     }
 
     /// The direction toward the light for a ray that arrived along `direction`, and the share of the class's

@@ -5,7 +5,7 @@ use crate::chain::{Solved, Terms};
 use crate::error::Error;
 use crate::math::{Vec3, frame, unit};
 use crate::qmc::{Sequence, hash2};
-use crate::ray::{NO_FACET, Ray};
+use crate::ray::Ray;
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
 
@@ -93,7 +93,7 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
         for column in 0..view.cells {
             let (x, y) = sequence.pair(column as u32 & 0xffff, 0);
             let origin = view.corner + view.right * (column as f64 + x) + view.up * (row as f64 + y);
-            let ray = Ray { origin, direction: view.forward, t_max: f64::INFINITY, skip: NO_FACET };
+            let ray = Ray::new(origin, view.forward);
             terms.clear(bands);
             let path = solved.radiance(&ray, hash2(row as u32, column as u32), &mut terms);
             sums.rays += 1 + u64::from(path.rays);

@@ -38,10 +38,17 @@ pub const MOST_RAYS: u32 = 1 << 16;
 impl RowSettings {
     /// Settings for a tolerance: the row's error, n^-3/4 / 2 at its worst, times the diffuse reflectance (and
     /// the contrast between facet and sky, about 1/2), is kept below the tolerance.
-    pub fn new(scene: &Scene<'_>, tolerance: f64, max_bounces: Option<u32>, directional: bool, all: bool) -> Self {
+    pub fn new(
+        scene: &Scene<'_>,
+        tolerance: f64,
+        max_bounces: Option<u32>,
+        directional: bool,
+        all: bool,
+    ) -> Self {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
         let wanted = pow(0.5 * diffuse / tolerance, 4.0 / 3.0);
-        let rays = if wanted < 64.0 { 64 } else { (wanted.min(f64::from(MOST_RAYS)) as u32).next_power_of_two() };
+        let rays =
+            if wanted < 64.0 { 64 } else { (wanted.min(f64::from(MOST_RAYS)) as u32).next_power_of_two() };
         let longest = super::word::LONGEST as u32;
         RowSettings {
             rays: rays.min(MOST_RAYS),
@@ -140,13 +147,16 @@ impl Tracer<'_, '_> {
         }
         let share = 1.0 / f64::from(tally.rays);
         let halves = f64::from(tally.blocked) - 2.0 * f64::from(tally.blocked_first_half);
-        self.sink.end_row(share, Row {
-            rays: tally.rays,
-            chain_rays: tally.chain_rays,
-            lost: tally.lost * share,
-            spread: crate::math::fabs(halves) * share,
-            ..Row::default()
-        });
+        self.sink.end_row(
+            share,
+            Row {
+                rays: tally.rays,
+                chain_rays: tally.chain_rays,
+                lost: tally.lost * share,
+                spread: crate::math::fabs(halves) * share,
+                ..Row::default()
+            },
+        );
         Some(())
     }
 
@@ -169,7 +179,12 @@ impl Tracer<'_, '_> {
             tally.chain_rays += u32::from(word != EMPTY);
             let Some(hit) = hit else {
                 if word != EMPTY {
-                    self.sink.push(Record::escape(self.kept(ray.direction), word, weight, scaled(local, weight)))?;
+                    self.sink.push(Record::escape(
+                        self.kept(ray.direction),
+                        word,
+                        weight,
+                        scaled(local, weight),
+                    ))?;
                 }
                 return Some(());
             };

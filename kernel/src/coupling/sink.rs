@@ -8,9 +8,10 @@ use crate::error::Error;
 use core::cmp::Ordering;
 use core::ops::Range;
 
-/// Bytes of a block that holds `rows` rows of about `records` records each.
-pub fn bytes(rows: usize, records: usize, bands: usize) -> Result<usize, Error> {
-    let all = rows.saturating_mul(records).saturating_add(1024);
+/// Bytes of a block that holds `rows` rows of about `records` records each; a row needs room for `unmerged`
+/// records while it grows.
+pub fn bytes(rows: usize, records: usize, unmerged: usize, bands: usize) -> Result<usize, Error> {
+    let all = rows.saturating_mul(records).saturating_add(unmerged);
     let capacity = word_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
     fixed(rows, capacity, bands).and::<Record>(all).bytes()
 }
@@ -63,7 +64,15 @@ impl<'m> Sink<'m> {
             directional: u64::from(directional),
             ..Head::default()
         };
-        Ok(Sink { words: Words::new(words, products, bands), head, rows, records, start: 0, used: 0, done: 0 })
+        Ok(Sink {
+            words: Words::new(words, products, bands),
+            head,
+            rows,
+            records,
+            start: 0,
+            used: 0,
+            done: 0,
+        })
     }
 
     /// Adds a record to the present row; `None` where the memory is full.
@@ -136,4 +145,3 @@ fn order(words: &Words<'_>, a: &Record, b: &Record) -> Ordering {
         other => other,
     }
 }
-

@@ -94,7 +94,8 @@ impl<'m> Words<'m> {
             }
             at = self.get(at).sibling;
         }
-        let new = u16::try_from(self.used).ok().filter(|&n| (n as usize) < self.words.len() && n < u16::MAX)?;
+        let new =
+            u16::try_from(self.used).ok().filter(|&n| (n as usize) < self.words.len() && n < u16::MAX)?;
         let depth = self.get(word).depth + 1;
         self.words[new as usize] = Word { class, depth, child: 0, sibling: first, parent: word, unused: 0 };
         self.words[word as usize].child = new;
@@ -140,7 +141,12 @@ mod tests {
 
     #[test]
     fn a_word_is_its_letters_whatever_their_order() {
-        let material = |s: &'static [f64]| MaterialInput { diffuse: &[0.0, 0.0], specular: s, emission: &[0.0, 0.0], gloss: None };
+        let material = |s: &'static [f64]| MaterialInput {
+            diffuse: &[0.0, 0.0],
+            specular: s,
+            emission: &[0.0, 0.0],
+            gloss: None,
+        };
         let materials = [material(&[0.1, 0.9]), material(&[0.3, 0.2]), material(&[0.7, 0.6])];
         let input = SceneInput {
             vertices: &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
