@@ -25,6 +25,7 @@ use crate::scene::{Scene, SceneInput};
 use crate::signature::{self, Signature, Sums, View};
 use crate::simd::Isa;
 use crate::sky::{Sky, SkyInput};
+use crate::subdivide;
 use crate::sun::{Sun, SunInput};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -154,7 +155,12 @@ impl Host {
         let bvh = Bvh::build_obvhs(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
         report.bytes.bvh = bvh.memory();
         report.seconds.bvh = clock.lap();
-        let divisions = std::vec![1u32; scene.facets()];
+        let mut unevenness = std::vec![0.0; scene.facets()];
+        let probes =
+            self.split(&mut unevenness, 1, |range, out| subdivide::probe(&scene, &bvh, range, out))?;
+        report.rays.visibility += probes.iter().sum::<u64>();
+        let mut divisions = std::vec![1u32; scene.facets()];
+        subdivide::divisions(&scene, &unevenness, settings.tolerance, &mut divisions)?;
         *element_memory = Memory::new(Elements::bytes(&divisions)?);
         let elements = Elements::new(&scene, &divisions, element_memory.bytes_mut())?;
         report.elements = elements.count();

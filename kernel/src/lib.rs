@@ -29,6 +29,7 @@ pub mod scene;
 pub mod signature;
 pub mod simd;
 pub mod sky;
+pub mod subdivide;
 pub mod sun;
 
 pub use error::{Error, Field};

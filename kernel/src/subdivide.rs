@@ -1,0 +1,159 @@
+//! How finely each facet is cut: where the share of the hemisphere that is blocked changes over the facet in a
+//! way that no linear function follows, such as where another facet pierces it or stands on it.
+//!
+//! Geometry, materials and tolerance decide, never the light.
+
+use crate::bvh::Bvh;
+use crate::element::MAX_DIVISIONS;
+use crate::error::Error;
+use crate::math::{Vec3, frame};
+use crate::mirror::Surface;
+use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::scene::Scene;
+use core::ops::Range;
+
+/// Bins along each edge of a probed facet.
+const EDGE: usize = 4;
+/// Bins of a facet.
+const BINS: usize = EDGE * EDGE;
+/// Probing rays of a bin.
+const RAYS: u32 = 16;
+
+/// Probes each facet of `range`: how far the blocked share of the hemisphere departs from a linear function of
+/// the position, as a variance less what the rays' noise explains; 0 where that is all. Returns the rays traced.
+pub fn probe(scene: &Scene<'_>, bvh: &Bvh<'_>, range: Range<usize>, out: &mut [f64]) -> Result<u64, Error> {
+    if out.len() != range.len() {
+        return Err(Error::Length { what: "unevenness", expected: range.len(), given: out.len() });
+    }
+    let mut rays = 0;
+    for (facet, value) in range.zip(out) {
+        *value = 0.0;
+        let dark = scene.diffuse(scene.material(facet)).iter().all(|&d| d == 0.0);
+        if scene.areas()[facet] == 0.0 || dark {
+            continue;
+        }
+        for side in 0..scene.sides() {
+            let blocked = probe_side(scene, bvh, facet, side, &mut rays);
+            *value = f64::max(*value, unevenness(&blocked));
+        }
+    }
+    Ok(rays)
+}
+
+/// Share of the hemisphere that is blocked in each bin of one side of a facet.
+fn probe_side(scene: &Scene<'_>, bvh: &Bvh<'_>, facet: usize, side: usize, rays: &mut u64) -> [f64; BINS] {
+    let mut blocked = [0.0; BINS];
+    let (x, y) = frame(scene.side_normal(facet, side));
+    let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000));
+    // all bins in turn, so that an open facet is known after a quarter of the rays
+    for index in 0..RAYS {
+        for (bin, count) in blocked.iter_mut().enumerate() {
+            let at = index * BINS as u32 + bin as u32;
+            let (p, q) = sequence.pair(at, 2);
+            let (u, v) = in_bin(bin, triangle(p, q));
+            let origin = Surface::new(scene, facet, side, u, v);
+            let (p, q) = sequence.pair(at, 0);
+            let (dx, dy, dz) = cosine_direction(p, q);
+            let direction: Vec3 = x * dx + y * dy + origin.normal * dz;
+            *count += if bvh.occluded(&origin.leave(direction)) { 1.0 / f64::from(RAYS) } else { 0.0 };
+        }
+        *rays += BINS as u64;
+        if index + 1 == RAYS / 4 && blocked.iter().all(|&b| b == 0.0) {
+            break;
+        }
+    }
+    blocked
+}
+
+/// Barycentric weights in the facet of a point of a bin: bins are the triangles of an edge cut in [`EDGE`].
+fn in_bin(bin: usize, (a, b): (f64, f64)) -> (f64, f64) {
+    let (mut i, mut rest) = (0, bin);
+    while rest >= 2 * (EDGE - i) - 1 {
+        rest -= 2 * (EDGE - i) - 1;
+        i += 1;
+    }
+    let (j, n) = (rest / 2, EDGE as f64);
+    if rest % 2 == 1 {
+        (((i + 1) as f64 - a) / n, ((j + 1) as f64 - b) / n)
+    } else {
+        ((i as f64 + a) / n, (j as f64 + b) / n)
+    }
+}
+
+/// Variance of the bins about their best linear function, less three times what the rays' noise brings.
+fn unevenness(blocked: &[f64; BINS]) -> f64 {
+    let n = BINS as f64;
+    let mean = blocked.iter().sum::<f64>() / n;
+    // moments about the centroid, in barycentric coordinates
+    let (mut xx, mut xy, mut yy, mut xb, mut yb, mut bb) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (bin, value) in blocked.iter().enumerate() {
+        let (x, y) = in_bin(bin, (1.0 / 3.0, 1.0 / 3.0));
+        let (x, y, b) = (x - 1.0 / 3.0, y - 1.0 / 3.0, value - mean);
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+        xb += x * b;
+        yb += y * b;
+        bb += b * b;
+    }
+    let determinant = xx * yy - xy * xy;
+    let explained = (yy * xb * xb - 2.0 * xy * xb * yb + xx * yb * yb) / determinant;
+    let residual = (bb - explained).max(0.0) / (n - 3.0);
+    // a net of 16 rays has about half the variance of independent ones
+    let noise = 0.5 * mean * (1.0 - mean) / f64::from(RAYS);
+    let excess = residual - noise;
+    if residual > 3.0 * noise { excess } else { 0.0 }
+}
+
+/// Divisions of each facet's edges from its unevenness.
+///
+/// A jump leaves an error in the elements that it crosses, a share 1/S of them: the facet's part of the image's
+/// mean square error is a V rho^2/S with its share `a` of the area. The least number of elements for a given
+/// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what twice as many elements as
+/// there are facets (more for tolerances below 1e-3) reach.
+pub fn divisions(scene: &Scene<'_>, unevenness: &[f64], tolerance: f64, out: &mut [u32]) -> Result<(), Error> {
+    for given in [unevenness.len(), out.len()] {
+        if given != scene.facets() {
+            return Err(Error::Length { what: "divisions", expected: scene.facets(), given });
+        }
+    }
+    let total: f64 = scene.areas().iter().sum();
+    let root = |facet: usize| {
+        let rho = scene.diffuse(scene.material(facet)).iter().fold(0.0, |a: f64, &b| a.max(b));
+        libm::cbrt(scene.areas()[facet] / total * unevenness[facet] * rho * rho)
+    };
+    let goal = 0.25 * tolerance * tolerance;
+    let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;
+    let most = scene.facets() as f64 * (1.0 + (1e-3 / tolerance).max(1.0)) + 256.0;
+    loop {
+        let mut elements = 0.0;
+        for (facet, s) in out.iter_mut().enumerate() {
+            *s = (libm::ceil(factor * root(facet)).min(f64::from(MAX_DIVISIONS)) as u32).max(1);
+            elements += f64::from(*s * *s);
+        }
+        if elements <= most {
+            return Ok(());
+        }
+        factor *= 0.8;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_is_uneven_and_a_slope_is_not() {
+        let of = |f: fn(f64, f64) -> f64| {
+            let mut bins = [0.0; BINS];
+            for (bin, b) in bins.iter_mut().enumerate() {
+                let (x, y) = in_bin(bin, (1.0 / 3.0, 1.0 / 3.0));
+                *b = f(x, y);
+            }
+            unevenness(&bins)
+        };
+        assert_eq!(of(|x, y| 0.2 + 0.3 * x + 0.4 * y), 0.0);
+        assert_eq!(of(|_, _| 1.0), 0.0);
+        assert!(of(|x, _| if x < 0.3 { 1.0 } else { 0.1 }) > 0.03);
+    }
+}
