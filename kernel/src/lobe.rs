@@ -27,6 +27,8 @@ pub struct Lobe {
     ratio: f64,
     /// ln(ratio).
     log_ratio: f64,
+    /// ln(ratio)/(ratio - 1).
+    log_slope: f64,
     /// C.
     peak: f64,
 }
@@ -43,7 +45,7 @@ impl Lobe {
         }
         let ratio = axis_ratio.min(MIRROR_AXIS_RATIO);
         let log_ratio = log(ratio);
-        Ok(Lobe { ratio, log_ratio, peak: growth(2.0 * log_ratio) / PI })
+        Ok(Lobe { ratio, log_ratio, log_slope: log_slope(ratio - 1.0), peak: growth(2.0 * log_ratio) / PI })
     }
 
     /// Whether the lobe is so narrow that the caller treats it as an ideal mirror.
@@ -72,7 +74,7 @@ impl Lobe {
         let excess = self.ratio - 1.0;
         let root = sqrt(1.0 + excess * (self.ratio + 1.0) * c * c);
         let rise = (c + (self.ratio + 1.0) * c * c / (1.0 + root)) / (1.0 + c);
-        let half = 0.5 * rise * log_slope(rise * excess) / log_slope(excess);
+        let half = 0.5 * rise * log_slope(rise * excess) / self.log_slope;
         if cos_theta >= 0.0 { 0.5 + half } else { 0.5 - half }
     }
 

@@ -106,6 +106,8 @@ impl Cie {
     /// | 1e-5 | 16 x 16 | 6e-6 | 1e-4 |
     /// | 1e-6 | 24 x 24 | 4e-7 | 6e-6 |
     /// | less | 32 x 32 | 2e-8 | 1e-7 |
+    ///
+    /// Each point costs two exponentials and an arc cosine: 10 us a normal for 2e-3, 100 us for 1e-6.
     pub(super) fn irradiance(&self, normal: Vec3, up: Vec3, relative_error: f64) -> f64 {
         let (polar, around) = match relative_error {
             asked if asked >= 2e-3 => (6, 8),
@@ -122,7 +124,7 @@ impl Cie {
         // in the coordinates (axis, horizontal toward the normal, up)
         let sun = [self.sun.dot(axis), self.sun.dot(up.cross(axis)), self.sun.dot(up)];
         let theta = atan2(sqrt(sun[1] * sun[1] + sun[2] * sun[2]), sun[0]);
-        let split = atan2(sun[2], sun[1]).clamp(0.0, width);
+        let split = atan2(sun[2], sun[1]).max(0.0).min(width);
 
         let mut columns = [(0.0, 0.0, 0.0); 64];
         fill(&mut columns, theta, polar);
