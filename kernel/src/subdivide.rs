@@ -111,7 +111,12 @@ fn unevenness(blocked: &[f64; BINS]) -> f64 {
 /// mean square error is a V rho^2/S with its share `a` of the area. The least number of elements for a given
 /// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what twice as many elements as
 /// there are facets (more for tolerances below 1e-3) reach.
-pub fn divisions(scene: &Scene<'_>, unevenness: &[f64], tolerance: f64, out: &mut [u32]) -> Result<(), Error> {
+pub fn divisions(
+    scene: &Scene<'_>,
+    unevenness: &[f64],
+    tolerance: f64,
+    out: &mut [u32],
+) -> Result<(), Error> {
     for given in [unevenness.len(), out.len()] {
         if given != scene.facets() {
             return Err(Error::Length { what: "divisions", expected: scene.facets(), given });
