@@ -57,6 +57,8 @@ pub struct Bvh<'m> {
     levels: usize,
     low: Vec3,
     high: Vec3,
+    /// Largest magnitude of a coordinate.
+    scale: f64,
     isa: Isa,
 }
 
@@ -145,6 +147,7 @@ impl<'m> Bvh<'m> {
         let size = Size::of(corners.len())?;
         let mut arena = Arena::new(memory, size.bytes()?)?;
         let (low, high) = extent(corners, areas)?;
+        let scale = low.abs().max(high.abs()).max_element();
         let boxes = arena.take::<Boxes>(size.nodes)?;
         let children = arena.take::<[u32; 8]>(size.nodes)?;
         let facets = arena.take::<[u32; LANES]>(size.packets)?;
@@ -162,7 +165,7 @@ impl<'m> Bvh<'m> {
         }
         let (boxes, _) = boxes.split_at(made.nodes.min(boxes.len()));
         let (children, _) = children.split_at(boxes.len());
-        Ok(Bvh { boxes, children, packets, facets, levels: made.levels, low, high, isa })
+        Ok(Bvh { boxes, children, packets, facets, levels: made.levels, low, high, scale, isa })
     }
 
     /// The first facet that the ray meets: least t with `0 < t < t_max`, then lowest index.

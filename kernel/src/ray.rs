@@ -33,7 +33,7 @@ pub struct Hit {
     /// Distance from the origin along the ray, in lengths of its direction, greater than 0.
     ///
     /// Off from the facet's plane by some 8 eps |corner - origin| / |cos(direction, normal)| with eps = 2^-53,
-    /// whatever the facet's aspect, and never beyond the facet's own bounding box.
+    /// whatever the facet's aspect, and never beyond the facet's own bounding box by more than that with cosine 2^-10.
     pub t: f64,
     /// Index of the facet.
     pub facet: u32,
@@ -103,6 +103,10 @@ fn product(a: f64, b: f64) -> (f64, f64) {
 /// distance), far below what the boxes of the tree are widened by.
 pub(crate) const SLACK: f64 = 1.0 / (1u64 << 46) as f64;
 
+/// Up to this squared cosine a facet's plane is not trusted alone. Above it, t is within 2^-40 of the corner's
+/// distance of the entry into the facet's box, or after.
+const GRAZING: f64 = 1.0 / (1u64 << 20) as f64;
+
 /// Components of a direction below this are raised to it where they divide.
 const SMALLEST: f64 = 1e-200;
 
@@ -153,7 +157,7 @@ impl Line {
             direction: ray.direction,
             inverse: Vec3::from_array(inverse),
             axes: [first, second, along],
-            shear: [d[first] / d[along], d[second] / d[along]],
+            shear: [d[first] * inverse[along], d[second] * inverse[along]],
         })
     }
 
@@ -182,7 +186,11 @@ impl Line {
         if front == back {
             return None; // outside; or all zero: seen edge-on, where its neighbours stand for it
         }
-        let t = self.clamp(normal.dot(moved[0]) / normal.dot(self.direction), &moved);
+        let cosine = normal.dot(self.direction);
+        let mut t = normal.dot(moved[0]) / cosine;
+        if cosine * cosine <= GRAZING * normal.dot(normal) {
+            t = self.clamp(t, &moved);
+        }
         if !(t > 0.0 && t < f64::INFINITY) {
             return None;
         }
@@ -193,7 +201,7 @@ impl Line {
     /// `t`, or the nearest value at which the ray is inside the facet's bounding box. Grazing rays need it, for
     /// which the plane alone says little, and the boxes of the tree rely on it. NaN (0/0: the ray lies in the plane)
     /// becomes the entry.
-    #[inline(always)]
+    #[cold]
     fn clamp(&self, t: f64, moved: &[Vec3; 3]) -> f64 {
         let [a, b, c] = *moved;
         let reach = a.abs().max(b.abs()).max(c.abs()).max_element();

@@ -2,15 +2,16 @@
 //!
 //! **Boxes are conservative.** A facet that the ray hits at `t` in the arithmetic of [`ray`](crate::ray) lies in
 //! boxes that are never culled while the limit is at least `t`. The hit arithmetic accepts no facet whose box,
-//! widened by 2^-46 of the corner's distance, the ray misses, and no `t` before its entry into that box. The slab
-//! test works with the ray's origin moved outward on every axis by `pad`, which exceeds that slack, the rounding
+//! widened by 2^-46 of the corner's distance, the ray misses, and no `t` more than 2^-40 of it before the entry into
+//! that box. The slab
+//! test works with the ray's origin moved outward on every axis by `pad`, which exceeds those, the rounding
 //! of the origin to f32 and the effect of replacing small direction components; its subtraction therefore has the
 //! right sign, and what is left is three roundings of 2^-24 relative, which [`WIDEN`] covers.
 
 use super::{Boxes, Bvh, LEAF, PAIR, Packet};
 use crate::math::{Vec3, fabs};
 use crate::ray::{Hit, Line, Ray};
-use crate::simd::{self, Task};
+use crate::simd::{self, LaneTask, Lanes};
 
 /// Factor on the far side of slabs: 1 + 2^-20, above the (1 + 2^-24)^8 that near and far sides need together.
 const WIDEN: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
@@ -27,12 +28,12 @@ const LONG: usize = 512;
 
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    simd::run(bvh.isa, Search::<false> { bvh, ray })
+    simd::run_lanes(bvh.isa, Search::<false> { bvh, ray })
 }
 
 /// See [`Bvh::occluded`].
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
-    simd::run(bvh.isa, Search::<true> { bvh, ray }).is_some()
+    simd::run_lanes(bvh.isa, Search::<true> { bvh, ray }).is_some()
 }
 
 /// The search for the first hit, or for any.
@@ -41,15 +42,15 @@ struct Search<'a, const ANY: bool> {
     ray: &'a Ray,
 }
 
-impl<const ANY: bool> Task for Search<'_, ANY> {
+impl<const ANY: bool> LaneTask for Search<'_, ANY> {
     type Out = Option<Hit>;
 
     #[inline(always)]
-    fn run(self) -> Option<Hit> {
+    fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
         if self.bvh.levels * 7 < SHORT {
-            Walk::new(self.bvh, self.ray)?.search::<ANY, SHORT>()
+            Walk::new(self.bvh, self.ray)?.search::<L, ANY, SHORT>(lanes)
         } else {
-            Walk::new(self.bvh, self.ray)?.search::<ANY, LONG>()
+            Walk::new(self.bvh, self.ray)?.search::<L, ANY, LONG>(lanes)
         }
     }
 }
@@ -80,10 +81,10 @@ impl<'a> Walk<'a> {
     #[inline(always)]
     fn new(bvh: &'a Bvh<'a>, ray: &'a Ray) -> Option<Self> {
         let line = Line::new(ray)?;
-        let scale = bvh.low.abs().max(bvh.high.abs()).max_element();
+        let scale = bvh.scale;
         let distance = ray.origin.abs().max_element();
         // 2^-20 of the scene is 4 times the rounding of an origin within 4 times its size.
-        let pad = scale * (1.0 / (1u64 << 20) as f64) + distance * (1.0 / (1u64 << 44) as f64);
+        let pad = scale * (1.0 / (1u64 << 20) as f64) + distance * (1.0 / (1u64 << 38) as f64);
         let mut origin = ray.origin;
         let mut start = 0.0;
         if distance > 4.0 * scale {
@@ -122,24 +123,36 @@ impl<'a> Walk<'a> {
 
     /// The walk itself: nearest child first, the rest on the stack with their distances.
     #[inline(always)]
-    fn search<const ANY: bool, const N: usize>(mut self) -> Option<Hit> {
+    fn search<L: Lanes, const ANY: bool, const N: usize>(mut self, lanes: L) -> Option<Hit> {
+        let beam = Beam::new(lanes, &self);
         let mut stack = [0u64; N];
         let mut top = 0;
-        let mut next = if self.bvh.boxes.is_empty() { return None } else { 0u32 };
+        let mut next = if self.bvh.boxes.is_empty() { return None } else { 0 };
         loop {
             if next & LEAF == 0 {
                 let boxes = self.bvh.boxes.get(next as usize)?;
                 let children = self.bvh.children.get(next as usize)?;
-                let (near, mut hits) = self.slabs(boxes);
-                let bottom = top;
-                while hits != 0 {
+                let (near, mut hits) = beam.slabs(boxes, self.limit);
+                let near = lanes.store8(near);
+                let entry = |hits: u32| {
                     let child = hits.trailing_zeros() as usize & 7;
+                    u64::from(near[child].to_bits()) << 32 | u64::from(children[child])
+                };
+                if hits != 0 {
+                    let mut nearest = entry(hits);
+                    let bottom = top;
                     hits &= hits - 1;
-                    let entry = u64::from(near[child].to_bits()) << 32 | u64::from(children[child]);
-                    push(&mut stack, bottom, &mut top, entry);
+                    while hits != 0 {
+                        let other = entry(hits);
+                        push(&mut stack, bottom, &mut top, nearest.max(other));
+                        nearest = nearest.min(other);
+                        hits &= hits - 1;
+                    }
+                    next = nearest as u32;
+                    continue;
                 }
             } else {
-                self.leaf(next);
+                self.leaf(lanes, &beam, next);
                 if ANY && self.best.is_some() {
                     return self.best;
                 }
@@ -157,80 +170,29 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Where the ray enters the eight boxes, and which of them it meets before the limit, as bits.
-    #[inline(always)]
-    fn slabs(&self, boxes: &Boxes) -> ([f32; 8], u32) {
-        let mut near = [0.0f32; 8];
-        let mut far = [f32::INFINITY; 8];
-        for axis in 0..3 {
-            let (first, second) =
-                (&boxes[axis][self.side[axis] & 1], &boxes[axis][1 - (self.side[axis] & 1)]);
-            for i in 0..8 {
-                let a = (first[i] - self.near[axis]) * self.inverse[axis];
-                let b = (second[i] - self.far[axis]) * self.inverse[axis];
-                near[i] = if a > near[i] { a } else { near[i] };
-                far[i] = if b < far[i] { b } else { far[i] };
-            }
-        }
-        let mut hits = 0;
-        for i in 0..8 {
-            let widened = far[i] * WIDEN;
-            let end = if self.limit < widened { self.limit } else { widened };
-            hits |= u32::from(near[i] <= end) << i;
-        }
-        (near, hits)
-    }
-
     /// Tests the packets of a leaf.
     #[inline(always)]
-    fn leaf(&mut self, leaf: u32) {
+    fn leaf<L: Lanes>(&mut self, lanes: L, beam: &Beam<L>, leaf: u32) {
         let first = (leaf & !(LEAF | PAIR)) as usize;
-        self.packet(first);
+        self.packet(lanes, beam, first);
         if leaf & PAIR != 0 {
-            self.packet(first + 1);
+            self.packet(lanes, beam, first + 1);
         }
     }
 
     #[inline(always)]
-    fn packet(&mut self, index: usize) {
+    fn packet<L: Lanes>(&mut self, lanes: L, beam: &Beam<L>, index: usize) {
         let bvh = self.bvh;
         let (Some(packet), Some(facets)) = (bvh.packets.get(index), bvh.facets.get(index)) else { return };
-        let (edges, mut inside) = self.edges(packet);
-        while inside != 0 {
-            let lane = inside.trailing_zeros() as usize & 3;
-            inside &= inside - 1;
-            self.facet(packet, facets[lane], lane, edges.map(|e| e[lane]));
-        }
-    }
-
-    /// The edge functions of four facets, and which facets may have the ray inside: [`Line::edges`], lane by lane.
-    #[inline(always)]
-    fn edges(&self, packet: &Packet) -> ([[f64; 4]; 3], u32) {
-        let [first, second, along] = self.line.axes;
-        let origin = self.ray.origin.to_array();
-        let mut images = [[[0.0f64; 4]; 2]; 3];
-        for (image, corner) in images.iter_mut().zip(packet) {
-            for i in 0..4 {
-                let mut moved = [0.0; 3];
-                moved[along] = corner[along][i] - origin[along];
-                image[0][i] = (corner[first][i] - origin[first]) - self.line.shear[0] * moved[along];
-                image[1][i] = (corner[second][i] - origin[second]) - self.line.shear[1] * moved[along];
+        let (edges, mut inside) = beam.edges(packet);
+        if inside != 0 {
+            let edges = [lanes.store4(edges[0]), lanes.store4(edges[1]), lanes.store4(edges[2])];
+            while inside != 0 {
+                let lane = inside.trailing_zeros() as usize & 3;
+                inside &= inside - 1;
+                self.facet(packet, facets[lane], lane, [edges[0][lane], edges[1][lane], edges[2][lane]]);
             }
         }
-        let [a, b, c] = images;
-        let mut edges = [[0.0f64; 4]; 3];
-        let mut inside = 0;
-        for i in 0..4 {
-            let at = |image: [[f64; 4]; 2]| [image[0][i], image[1][i]];
-            let [e0, e1, e2] = self.line.edges([at(a), at(b), at(c)]);
-            (edges[0][i], edges[1][i], edges[2][i]) = (e0, e1, e2);
-            let least = if e0 < e1 { e0 } else { e1 };
-            let least = if e2 < least { e2 } else { least };
-            let most = if e0 > e1 { e0 } else { e1 };
-            let most = if e2 > most { e2 } else { most };
-            inside |= u32::from((least >= 0.0) | (most <= 0.0)) << i;
-        }
-        (edges, inside)
     }
 
     /// Takes the hit with one facet where it is better than the best so far.
@@ -239,16 +201,105 @@ impl<'a> Walk<'a> {
         if facet == self.ray.skip {
             return;
         }
-        let [a, b, c, normal] = (*packet).map(|rows| Vec3::from_array(rows.map(|row| row[lane])));
+        let [a, b, c, normal] = packet;
         let origin = self.ray.origin;
-        let Some(hit) = self.line.hit(facet, edges, [a - origin, b - origin, c - origin], normal) else {
-            return;
-        };
+        let moved = [vector(a, lane) - origin, vector(b, lane) - origin, vector(c, lane) - origin];
+        let Some(hit) = self.line.hit(facet, edges, moved, vector(normal, lane)) else { return };
         let tie = hit.t == self.nearest && self.best.is_some_and(|best| facet < best.facet);
         if hit.t < self.nearest || tie {
             self.shorten(hit.t);
             self.best = Some(hit);
         }
+    }
+}
+
+/// One lane of a packet's row of vectors.
+#[inline(always)]
+fn vector([x, y, z]: &[[f64; 4]; 3], lane: usize) -> Vec3 {
+    Vec3::new(x[lane & 3], y[lane & 3], z[lane & 3])
+}
+
+/// What the lanes need of a ray, in every lane.
+struct Beam<L: Lanes> {
+    lanes: L,
+    side: [usize; 3],
+    near: [L::F8; 3],
+    far: [L::F8; 3],
+    inverse: [L::F8; 3],
+    axes: [usize; 3],
+    origin: [L::F4; 3],
+    shear: [L::F4; 2],
+}
+
+impl<L: Lanes> Beam<L> {
+    #[inline(always)]
+    fn new(lanes: L, walk: &Walk) -> Self {
+        let origin = walk.ray.origin.to_array();
+        let [first, second, along] = walk.line.axes;
+        let (n, f, i) = (walk.near, walk.far, walk.inverse);
+        Beam {
+            lanes,
+            side: walk.side,
+            near: [lanes.splat8(n[0]), lanes.splat8(n[1]), lanes.splat8(n[2])],
+            far: [lanes.splat8(f[0]), lanes.splat8(f[1]), lanes.splat8(f[2])],
+            inverse: [lanes.splat8(i[0]), lanes.splat8(i[1]), lanes.splat8(i[2])],
+            axes: walk.line.axes,
+            origin: [lanes.splat4(origin[first]), lanes.splat4(origin[second]), lanes.splat4(origin[along])],
+            shear: [lanes.splat4(walk.line.shear[0]), lanes.splat4(walk.line.shear[1])],
+        }
+    }
+
+    /// Where the ray enters the eight boxes, and which of them it meets before the limit, as bits.
+    #[inline(always)]
+    fn slabs(&self, boxes: &Boxes, limit: f32) -> (L::F8, u32) {
+        let lanes = self.lanes;
+        let mut near = lanes.splat8(0.0);
+        let mut far = lanes.splat8(f32::INFINITY);
+        for (axis, sides) in boxes.iter().enumerate() {
+            let side = self.side[axis] & 1;
+            let entry = lanes.sub8(lanes.load8(&sides[side]), self.near[axis]);
+            let exit = lanes.sub8(lanes.load8(&sides[1 - side]), self.far[axis]);
+            near = lanes.max8(lanes.mul8(entry, self.inverse[axis]), near);
+            far = lanes.min8(lanes.mul8(exit, self.inverse[axis]), far);
+        }
+        let far = lanes.min8(lanes.mul8(far, lanes.splat8(WIDEN)), lanes.splat8(limit));
+        (near, lanes.le8(near, far))
+    }
+
+    /// The edge functions of four facets, and which facets may have the ray inside: [`Line::edges`], lane by lane.
+    #[inline(always)]
+    fn edges(&self, packet: &Packet) -> ([L::F4; 3], u32) {
+        let lanes = self.lanes;
+        let [a, b, c] = [self.image(&packet[0]), self.image(&packet[1]), self.image(&packet[2])];
+        let edges = [self.cross(c, b), self.cross(a, c), self.cross(b, a)];
+        let least = lanes.min4(lanes.min4(edges[0], edges[1]), edges[2]);
+        let most = lanes.max4(lanes.max4(edges[0], edges[1]), edges[2]);
+        let zero = lanes.splat4(0.0);
+        (edges, lanes.le4(zero, least) | lanes.le4(most, zero))
+    }
+
+    // Methods rather than closures, which are not inlined into code compiled for another instruction set.
+
+    #[inline(always)]
+    fn image(&self, corner: &[[f64; 4]; 3]) -> [L::F4; 2] {
+        let lanes = self.lanes;
+        let [first, second, along] = self.axes;
+        let depth = self.moved(corner, along, self.origin[2]);
+        [
+            lanes.sub4(self.moved(corner, first, self.origin[0]), lanes.mul4(self.shear[0], depth)),
+            lanes.sub4(self.moved(corner, second, self.origin[1]), lanes.mul4(self.shear[1], depth)),
+        ]
+    }
+
+    #[inline(always)]
+    fn moved(&self, corner: &[[f64; 4]; 3], axis: usize, origin: L::F4) -> L::F4 {
+        let row = if axis < 3 { &corner[axis] } else { &corner[0] };
+        self.lanes.sub4(self.lanes.load4(row), origin)
+    }
+
+    #[inline(always)]
+    fn cross(&self, p: [L::F4; 2], q: [L::F4; 2]) -> L::F4 {
+        self.lanes.sub4(self.lanes.mul4(p[0], q[1]), self.lanes.mul4(p[1], q[0]))
     }
 }
 
