@@ -22,8 +22,11 @@ mod convex;
 mod pair;
 mod patch;
 mod point;
-mod quadrature;
+mod rule;
+mod visible;
 
 pub use batch::{LANES, TriangleBlock, point_to_triangles};
+pub use convex::Convex;
 pub use pair::{exchange_area, polygon_to_polygon};
 pub use point::{point_to_polygon, point_to_triangle};
+pub use visible::{Estimate, visible_point_to_polygon, visible_polygon_to_polygon};

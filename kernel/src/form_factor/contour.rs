@@ -3,7 +3,7 @@
 
 use super::angle::angle;
 use super::convex::{CAPACITY, Convex, edges};
-use super::quadrature::{GAUSS_6, GAUSS_10, GAUSS_16, Rule};
+use super::rule::{GAUSS_6, GAUSS_10, GAUSS_16, Rule};
 use crate::math::{Vec3, fabs, log, sqrt};
 
 /// Panels shorter than this share of an edge are not split further: over one, the integrand's singular part

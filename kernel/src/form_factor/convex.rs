@@ -19,6 +19,13 @@ impl Convex {
     /// No corners.
     pub const EMPTY: Convex = Convex { corners: [Vec3::ZERO; CAPACITY], count: 0 };
 
+    /// The first corners of `corners`, as many as fit.
+    pub(super) fn new(corners: &[Vec3]) -> Convex {
+        let mut polygon = Convex::EMPTY;
+        corners.iter().for_each(|c| polygon.push(*c));
+        polygon
+    }
+
     /// Appends a corner; one beyond the capacity is left out.
     pub(super) fn push(&mut self, corner: Vec3) {
         if let Some(slot) = self.corners.get_mut(self.count) {
@@ -93,8 +100,7 @@ pub(super) fn pieces(polygon: &[Vec3]) -> impl Iterator<Item = Convex> + '_ {
     let (apex, rest) = polygon.split_first().map_or((Vec3::ZERO, &[][..]), |(a, r)| (*a, r));
     let count = rest.len().saturating_sub(1).div_ceil(STEP);
     (0..count).map(move |k| {
-        let mut piece = Convex::EMPTY;
-        piece.push(apex);
+        let mut piece = Convex::new(&[apex]);
         rest.iter().skip(k * STEP).take(PIECE - 1).for_each(|c| piece.push(*c));
         piece
     })

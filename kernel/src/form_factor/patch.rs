@@ -1,6 +1,6 @@
 //! Quadrilateral patches and the area form of the form factor between them, by Gauss points.
 
-use super::quadrature::{GAUSS_2, GAUSS_3, GAUSS_4, GAUSS_5, GAUSS_6, Rule};
+use super::rule::{GAUSS_2, GAUSS_3, GAUSS_4, GAUSS_5, GAUSS_6, Rule};
 use crate::math::{FRAC_1_PI, Vec3, sqrt};
 
 /// Rules by how many times farther apart than large two patches are, for a relative error of at most 1e-10:
@@ -97,27 +97,32 @@ impl Patch {
         ((p + q) + (r + s)) * FRAC_1_PI
     }
 
-    /// The rule's points on this patch of unit normal `normal`, weighed by their height over the `other`.
+    /// The rule's points on this patch, weighed by their height over the `other`.
     fn points(&self, normal: Vec3, other: &Patch, other_normal: Vec3, rule: Rule) -> [Points; BLOCKS] {
-        let [a, b, c, d] = self.corners;
-        let (u, v, twist) = (b - a, d - a, (a - b) + (c - d));
-        let [plain, with_x, with_y] =
-            [u.cross(v), u.cross(twist), twist.cross(v)].map(|part| part.dot(normal));
-        let (base, rise) =
-            ((a - other.corners[0]).dot(other_normal), [u, v, twist].map(|s| s.dot(other_normal)));
-        let none = Points { x: [a.x; LANES], y: [a.y; LANES], z: [a.z; LANES], weight: [0.0; LANES] };
+        let [Vec3 { x, y, z }, base] = [self.corners[0], other.corners[0]];
+        let none = Points { x: [x; LANES], y: [y; LANES], z: [z; LANES], weight: [0.0; LANES] };
         let mut blocks = [none; BLOCKS];
-        let points = rule.iter().flat_map(|i| rule.iter().map(move |j| (*i, *j)));
         let lanes =
             blocks.iter_mut().flat_map(|p| p.x.iter_mut().zip(&mut p.y).zip(&mut p.z).zip(&mut p.weight));
-        for ((((px, py), pz), weight), ((x, wx), (y, wy))) in lanes.zip(points) {
-            let position = a + u * x + v * y + twist * (x * y);
-            (*px, *py, *pz) = position.into();
-            let area = wx * wy * (plain + with_x * x + with_y * y);
-            let height = base + rise[0] * x + rise[1] * y + rise[2] * (x * y);
-            // Below zero by rounding alone: the polygons are convex and were cut at each other's planes.
-            *weight = area.max(0.0) * height.max(0.0);
+        for ((((x, y), z), weight), (position, area)) in lanes.zip(self.nodes(normal, rule)) {
+            (*x, *y, *z) = position.into();
+            // Below zero by rounding alone: the polygons were cut at each other's planes.
+            *weight = area * (position - base).dot(other_normal).max(0.0);
         }
         blocks
+    }
+
+    /// The rule's points on this patch of unit normal `normal`, with the area that each stands for.
+    pub(super) fn nodes(&self, normal: Vec3, rule: Rule) -> impl Iterator<Item = (Vec3, f64)> + use<> {
+        let [a, b, c, d] = self.corners;
+        let (u, v, twist) = (b - a, d - a, (a - b) + (c - d));
+        let jacobian = [u.cross(v), u.cross(twist), twist.cross(v)].map(|part| part.dot(normal));
+        rule.iter().flat_map(move |(x, wx)| {
+            rule.iter().map(move |(y, wy)| {
+                let [plain, with_x, with_y] = jacobian;
+                let area = wx * wy * (plain + with_x * x + with_y * y);
+                (a + u * x + v * y + twist * (x * y), area.max(0.0))
+            })
+        })
     }
 }
