@@ -14,6 +14,7 @@ pub mod chain;
 pub mod coupling;
 pub mod element;
 pub mod error;
+pub mod form_factor;
 #[cfg(feature = "std")]
 pub mod host;
 pub mod image;

@@ -8,6 +8,7 @@
 pub mod cases;
 pub mod metric;
 pub mod npy;
+pub mod random;
 pub mod references;
 pub mod scene_file;
 pub mod scenes;

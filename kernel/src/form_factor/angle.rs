@@ -1,0 +1,83 @@
+//! The angle of a vector in the upper half plane, as straight-line code that vectorises.
+
+use crate::math::{FRAC_PI_2, PI};
+
+/// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
+const LOW: f64 = 0.414_213_562_373_095_05;
+const HIGH: f64 = 2.414_213_562_373_095;
+
+/// atan(z)/z in powers of z^2 for |z| <= tan(pi/8): interpolation at the Chebyshev nodes, error 3e-17.
+const ATAN: [f64; 11] = [
+    1.0,
+    -0.3333333333332844,
+    0.1999999999885511,
+    -0.14285714180976467,
+    0.11111106180455946,
+    -0.09090773074808414,
+    0.07689953496306857,
+    -0.06640233930429408,
+    0.056883492268090106,
+    -0.04348052215716462,
+    0.021135373157693246,
+];
+
+/// The angle in [0, pi] whose sine and cosine are as `y` >= 0 to `x`; 0 where both are 0.
+///
+/// Absolute error below 1e-15 everywhere, relative error below 1e-15 for angles below pi/2.
+#[inline(always)]
+pub(super) fn angle(y: f64, x: f64) -> f64 {
+    let wide = x.abs();
+    let (steep, slanted) = (y > HIGH * wide, y > LOW * wide);
+    let (above, below, turn) = (
+        select(steep, -wide, select(slanted, y - wide, y)),
+        select(steep, y, select(slanted, y + wide, wide)),
+        select(steep, FRAC_PI_2, select(slanted, 0.5 * FRAC_PI_2, 0.0)),
+    );
+    let z = above / select(below > f64::MIN_POSITIVE, below, f64::MIN_POSITIVE);
+    let z2 = z * z;
+    let acute = turn + z * arc_tangent_series(z2);
+    select(x < 0.0, PI - acute, acute)
+}
+
+/// atan(z)/z, by Estrin's scheme: half as many operations wait for one another as in Horner's.
+#[inline(always)]
+fn arc_tangent_series(z2: f64) -> f64 {
+    let [c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10] = ATAN;
+    let z4 = z2 * z2;
+    let z8 = z4 * z4;
+    let low = (c0 + c1 * z2) + (c2 + c3 * z2) * z4;
+    let mid = (c4 + c5 * z2) + (c6 + c7 * z2) * z4;
+    let high = (c8 + c9 * z2) + c10 * z4;
+    low + (mid + high * z8) * z8
+}
+
+/// One of two computed values, by mask rather than by branch: a branch would keep a loop from vectorising.
+#[inline(always)]
+fn select(condition: bool, yes: f64, no: f64) -> f64 {
+    let mask = (condition as u64).wrapping_neg();
+    f64::from_bits((yes.to_bits() & mask) | (no.to_bits() & !mask))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{atan2, cos, sin};
+
+    /// 1e-15: the polynomial's 3e-17 and five roundings of numbers up to pi.
+    #[test]
+    fn angles_agree_with_atan2() {
+        for k in 0..=100_000 {
+            let a = PI * f64::from(k) / 100_000.0;
+            for size in [1.0, 1e-120, 1e120] {
+                let (y, x) = (sin(a).max(0.0) * size, cos(a) * size);
+                let (got, want) = (angle(y, x), atan2(y, x));
+                assert!((got - want).abs() <= 1e-15 * want.clamp(0.0, 1.0), "{y:e} {x:e}: {got:e} {want:e}");
+            }
+        }
+        let tiny =
+            [(0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, PI), (1e-300, 1.0, 1e-300), (1.0, 0.0, FRAC_PI_2)];
+        for (y, x, want) in tiny {
+            assert_eq!(angle(y, x), want);
+        }
+    }
+}

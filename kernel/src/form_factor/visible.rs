@@ -1,0 +1,248 @@
+//! Form factors with opaque triangles in the way.
+
+use super::convex::{Convex, double_area, edges, pieces};
+use super::pair::{fronts, polygon_to_polygon};
+use super::patch::{Patch, patches};
+use super::point::point_to_polygon;
+use super::rule::GAUSS_3;
+use crate::error::Error;
+use crate::math::{Vec3, sqrt, unit};
+
+/// Rounding of a height, as a share of the distance.
+const ON_PLANE: f64 = 2e-15;
+
+/// Corners of a stored piece: a triangle cut at the polygon's plane has four sides, and a piece that they cut
+/// grows by one corner each, to what a [`Convex`] holds.
+const STORED: usize = 6;
+
+/// Times that a patch of the receiver is halved, at least: to meet a small shadow at all.
+const SHALLOWEST: u32 = 6;
+
+/// Times that a patch of the receiver is halved, at most.
+const DEEPEST: u32 = 26;
+
+/// A value with the error that comes with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// What its error is expected to stay below, absolute. Not a bound: a shadow too small for all points of
+    /// the quadrature goes unseen.
+    pub error: f64,
+}
+
+/// Form factor from the point `p` with the unit normal `n` to what of a convex planar `polygon` the opaque
+/// triangles `occluders` leave visible: as [`point_to_polygon`], exact but for rounding.
+///
+/// Occluders hide what lies behind them as seen from p, whichever side they turn; those that p sees edge-on,
+/// that lie in the polygon's plane or beyond it hide nothing. `scratch` holds the convex pieces of the visible
+/// part (what it holds before does not matter): an error where it has too few places; each occluder cuts the
+/// pieces that its outline crosses into at most four.
+///
+/// Nishita and Nakamae, 1985.
+pub fn visible_point_to_polygon<'o>(
+    p: Vec3,
+    n: Vec3,
+    polygon: &[Vec3],
+    occluders: impl IntoIterator<Item = &'o [Vec3; 3]>,
+    scratch: &mut [Convex],
+) -> Result<f64, Error> {
+    let (Some(first), Some(normal)) = (polygon.first(), unit(double_area(polygon))) else {
+        return Ok(0.0);
+    };
+    let distance = (*first - p).dot(normal);
+    let (normal, distance) = if distance < 0.0 { (-normal, -distance) } else { (normal, distance) };
+    let mut list = Pieces { slots: scratch, count: 0 };
+    for piece in pieces(polygon) {
+        list.push(&piece.map(|c| c - p).clip(|c| c.dot(n), 0.0))?;
+    }
+    for occluder in occluders {
+        if list.count == 0 {
+            break;
+        }
+        if let Some(shadow) = Shadow::new(&occluder.map(|c| c - p), normal, distance) {
+            list.subtract(&shadow)?;
+        }
+    }
+    let visible = list.slots.iter().take(list.count);
+    let sum: f64 = visible.map(|piece| point_to_polygon(Vec3::ZERO, n, piece.corners())).sum();
+    Ok(sum.min(1.0))
+}
+
+/// Form factor from the convex planar polygon `a` to what of `b` the opaque triangles `occluders` leave visible:
+/// the mean over a of [`visible_point_to_polygon`], one-sided as [`polygon_to_polygon`].
+///
+/// Gauss points on a, whose patches are halved where two resolutions differ, until the expected error (which
+/// comes back, at least a quarter of it) is below about `tolerance` (absolute, > 0). Outlines of shadows bend the integrand: the cost
+/// grows as the tolerance to the power -1/2. In [0, [`polygon_to_polygon`]]. `scratch` as there.
+pub fn visible_polygon_to_polygon(
+    a: &[Vec3],
+    b: &[Vec3],
+    occluders: &[[Vec3; 3]],
+    tolerance: f64,
+    scratch: &mut [Convex],
+) -> Result<Estimate, Error> {
+    let (area, unobstructed) = (double_area(a), polygon_to_polygon(a, b));
+    let size = 0.5 * sqrt(area.dot(area));
+    let (Some(normal), true) = (unit(area), unobstructed > 0.0) else {
+        return Ok(Estimate { value: 0.0, error: 0.0 });
+    };
+    let (mut value, mut error) = (0.0, 0.0);
+    for piece in pieces(a) {
+        for target in pieces(b) {
+            let Some((receiver, target)) = fronts(&piece, &target) else {
+                continue;
+            };
+            let mut mean = Mean { normal, size, target, occluders, tolerance: 0.25 * tolerance, scratch };
+            for patch in patches(receiver.corners()) {
+                let coarse = mean.over(&patch)?;
+                let part = mean.refined(&patch, coarse, f64::INFINITY, 0)?;
+                value += part.value;
+                error += part.error;
+            }
+        }
+    }
+    // What differences show is often a hundredth of the tolerance, but so little is not to be relied on.
+    let error = error.max(0.25 * tolerance).min(unobstructed);
+    Ok(Estimate { value: value.clamp(0.0, unobstructed), error })
+}
+
+/// The directions that a convex occluder hides: those on the positive side of all planes through the point.
+struct Shadow {
+    normals: Convex,
+}
+
+impl Shadow {
+    /// The shadow of a triangle, seen from the origin, on the plane normal . x = distance, distance >= 0; none
+    /// where it is seen edge-on or lies beyond that plane.
+    fn new(triangle: &[Vec3; 3], normal: Vec3, distance: f64) -> Option<Shadow> {
+        let reach = sqrt(triangle.iter().fold(0.0, |m: f64, c| m.max(c.length_squared())));
+        let tolerance = ON_PLANE * reach.max(distance);
+        let before = Convex::new(triangle).clip(|c| distance - c.dot(normal), tolerance);
+        let facing = before.corners().first()?.dot(unit(double_area(triangle))?);
+        if facing.abs() <= ON_PLANE * reach {
+            return None;
+        }
+        let mut normals = Convex::EMPTY;
+        for (a, b) in edges(before.corners()) {
+            if let Some(m) = unit(a.cross(b - a)) {
+                normals.push(if facing > 0.0 { m } else { -m });
+            }
+        }
+        Some(Shadow { normals })
+    }
+
+    /// The hidden part of a piece.
+    fn hidden(&self, piece: &Convex, tolerance: f64) -> Convex {
+        self.normals.corners().iter().fold(*piece, |part, m| part.clip(|c| c.dot(*m), tolerance))
+    }
+}
+
+/// The visible pieces in the caller's memory: the first `count` slots.
+struct Pieces<'s> {
+    slots: &'s mut [Convex],
+    count: usize,
+}
+
+impl Pieces<'_> {
+    /// Appends a piece, in two where it has many corners; one without area is left out.
+    fn push(&mut self, piece: &Convex) -> Result<(), Error> {
+        let corners = piece.corners();
+        let middle = corners.len() / 2;
+        match (corners.get(..=middle), corners.get(middle..), corners.first()) {
+            _ if piece.is_empty() => Ok(()),
+            (Some(head), Some(tail), Some(first)) if corners.len() > STORED => {
+                let mut rest = Convex::new(tail);
+                rest.push(*first);
+                self.store(Convex::new(head))?;
+                self.store(rest)
+            }
+            _ => self.store(*piece),
+        }
+    }
+
+    fn store(&mut self, piece: Convex) -> Result<(), Error> {
+        let limit = self.slots.len();
+        let slot = self.slots.get_mut(self.count);
+        *slot.ok_or(Error::TooMany { what: "visible pieces of a polygon", limit })? = piece;
+        self.count += 1;
+        Ok(())
+    }
+
+    fn copy(&mut self, from: usize, to: usize) {
+        let piece = self.slots.get(from).copied();
+        if let (Some(piece), Some(slot)) = (piece, self.slots.get_mut(to)) {
+            *slot = piece;
+        }
+    }
+
+    /// Takes a shadow out of all pieces.
+    fn subtract(&mut self, shadow: &Shadow) -> Result<(), Error> {
+        let mut index = 0;
+        let mut untouched = self.count;
+        while index < untouched {
+            let Some(piece) = self.slots.get(index).copied() else {
+                break;
+            };
+            let reach = piece.corners().iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
+            let tolerance = ON_PLANE * reach;
+            if shadow.hidden(&piece, tolerance).is_empty() {
+                index += 1;
+                continue;
+            }
+            // The last untouched piece takes this one's slot, the last new one takes that one's.
+            untouched -= 1;
+            self.count -= 1;
+            self.copy(untouched, index);
+            self.copy(self.count, untouched);
+            let mut rest = piece;
+            for m in shadow.normals.corners() {
+                self.push(&rest.clip(|c| -c.dot(*m), tolerance))?;
+                rest = rest.clip(|c| c.dot(*m), tolerance);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The mean over the receiver of the factor from its points to the visible part of the target.
+struct Mean<'m> {
+    normal: Vec3,
+    /// Area of the receiver, over which the mean is taken.
+    size: f64,
+    target: Convex,
+    occluders: &'m [[Vec3; 3]],
+    tolerance: f64,
+    scratch: &'m mut [Convex],
+}
+
+impl Mean<'_> {
+    /// A patch's part of the mean, by one rule.
+    fn over(&mut self, patch: &Patch) -> Result<f64, Error> {
+        let mut sum = 0.0;
+        for (p, area) in patch.nodes(self.normal, GAUSS_3) {
+            let target = self.target.corners();
+            sum += area * visible_point_to_polygon(p, self.normal, target, self.occluders, self.scratch)?;
+        }
+        Ok(sum / self.size)
+    }
+
+    /// The same, halved until both resolutions agree; `parent`: how far they were apart before the last halving.
+    ///
+    /// The patches that a shadow's outline bends lie along it, and are as many as it is longer than they are:
+    /// each may differ by the tolerance times its own length's share. Along an outline the difference falls by
+    /// 2.8 a halving and is shared by two: less than a quarter of the parent's is taken for chance.
+    fn refined(&mut self, patch: &Patch, coarse: f64, parent: f64, depth: u32) -> Result<Estimate, Error> {
+        let (lower, upper) = patch.halves();
+        let (low, high) = (self.over(&lower)?, self.over(&upper)?);
+        let difference = (low + high - coarse).abs();
+        let error = difference.max(0.25 * parent);
+        let within = error <= self.tolerance * patch.size() / sqrt(self.size);
+        if (within && depth >= SHALLOWEST) || depth >= DEEPEST {
+            return Ok(Estimate { value: low + high, error });
+        }
+        let low = self.refined(&lower, low, difference, depth + 1)?;
+        let high = self.refined(&upper, high, difference, depth + 1)?;
+        Ok(Estimate { value: low.value + high.value, error: low.error + high.error })
+    }
+}
