@@ -3,9 +3,12 @@
 /// The `N`-point Gauss-Legendre rule on (0, 1): exact for polynomials of degree below 2 N.
 ///
 /// Nodes ascend; they and the weights are right to a few ulp of 1.
-struct Gauss<const N: usize> {
-    nodes: [f64; N],
-    weights: [f64; N],
+#[derive(Clone, Copy, Debug)]
+pub struct Gauss<const N: usize> {
+    /// Abscissas, ascending in (0, 1).
+    pub nodes: [f64; N],
+    /// Weights; their sum is 1.
+    pub weights: [f64; N],
 }
 
 /// The Legendre polynomial of degree `n` at `x` and its derivative; not at x = 1 or -1.
@@ -21,10 +24,16 @@ const fn legendre(n: usize, x: f64) -> (f64, f64) {
     (value, n as f64 * (before - x * value) / (1.0 - x * x))
 }
 
+impl<const N: usize> Default for Gauss<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl<const N: usize> Gauss<N> {
     /// Finds the roots from the largest down: Newton's method on the polynomial divided by the roots found
     /// falls monotonically from beyond 1 to the next one, and two steps without the division remove its rounding.
-    const fn new() -> Self {
+    pub const fn new() -> Self {
         let mut rule = Gauss { nodes: [0.0; N], weights: [0.0; N] };
         let mut roots = [0.0; N];
         let mut found = 0;
@@ -71,8 +80,8 @@ static RULES: (Gauss<4>, Gauss<6>, Gauss<8>, Gauss<10>, Gauss<12>, Gauss<16>, Ga
     Gauss::new(),
 );
 
-/// Nodes (ascending) and weights (of sum 1) on (0, 1) of the smallest rule with at least `points` points that
-/// there is: 4, 6, 8, 10, 12, 16, 24 or 32; of the largest where none has as many.
+/// Nodes and weights on (0, 1) of the smallest rule with at least `points` of 4, 6, 8, 10, 12, 16, 24 or 32
+/// points; of the largest where none has as many.
 pub fn rule(points: usize) -> (&'static [f64], &'static [f64]) {
     match points {
         0..=4 => (&RULES.0.nodes, &RULES.0.weights),
