@@ -80,7 +80,8 @@ fn in_bin(bin: usize, (a, b): (f64, f64)) -> (f64, f64) {
     }
 }
 
-/// Variance of the bins about their best linear function, less three times what the rays' noise brings.
+/// Variance of the bins about their best linear function, less what the rays' noise brings; 0 where it is not
+/// three times that.
 fn unevenness(blocked: &[f64; BINS]) -> f64 {
     let n = BINS as f64;
     let mean = blocked.iter().sum::<f64>() / n;
@@ -99,8 +100,7 @@ fn unevenness(blocked: &[f64; BINS]) -> f64 {
     let determinant = xx * yy - xy * xy;
     let explained = (yy * xb * xb - 2.0 * xy * xb * yb + xx * yb * yb) / determinant;
     let residual = (bb - explained).max(0.0) / (n - 3.0);
-    // a net of 16 rays has about half the variance of independent ones
-    let noise = 0.5 * mean * (1.0 - mean) / f64::from(RAYS);
+    let noise = mean * (1.0 - mean) / f64::from(RAYS);
     let excess = residual - noise;
     if residual > 3.0 * noise { excess } else { 0.0 }
 }
