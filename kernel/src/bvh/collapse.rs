@@ -1,7 +1,7 @@
 //! From the binary tree to nodes of eight.
 
 use super::build::{Aabb, Binary};
-use super::{Boxes, LANES, LEAF, NONE, PAIR, STACK};
+use super::{Boxes, LANES, LEAF, NONE, PAIR};
 
 /// What came out.
 pub(super) struct Made {
@@ -13,8 +13,7 @@ pub(super) struct Made {
 /// Collapses the tree: each node takes in the largest of its inner children until it has eight or only leaves.
 /// Leaves' facets go to `lanes`.
 ///
-/// Nodes wait in the array that they will fill: the first child of one not yet made is its binary node. Going depth
-/// first keeps what is near in space near in memory, which a mesh beyond the cache gains a tenth from.
+/// Nodes wait in the array that they will fill: the first child of one not yet made is its binary node.
 pub(super) fn collapse(
     tree: &Binary,
     boxes: &mut [Boxes],
@@ -23,14 +22,11 @@ pub(super) fn collapse(
 ) -> Made {
     let empty = tree.nodes == 0;
     let mut lanes = Lanes::new(facets, tree.order.len());
-    let (mut nodes, mut levels) = (usize::from(!empty), 0);
-    // Nodes to be made, with their levels.
-    let mut stack = [(0usize, 1usize); STACK];
-    let mut top = nodes;
-    while top > 0 {
-        top -= 1;
-        let (node, level) = stack[top];
-        levels = levels.max(level);
+    let (mut node, mut nodes, mut levels, mut level_end) = (0, usize::from(!empty), 0, 0);
+    while node < nodes {
+        if node == level_end {
+            (levels, level_end) = (levels + 1, nodes);
+        }
         let (members, count) = open(tree, children[node][0]);
         boxes[node] = [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3];
         for (child, &member) in members.iter().take(count).enumerate() {
@@ -38,8 +34,6 @@ pub(super) fn collapse(
             Aabb::read(&tree.boxes[member as usize]).write(&mut boxes[node], child);
             children[node][child] = if facets == 0 {
                 children[nodes][0] = member;
-                stack[top] = (nodes, level + 1);
-                top += 1;
                 nodes += 1;
                 nodes as u32 - 1
             } else {
@@ -47,6 +41,7 @@ pub(super) fn collapse(
                 lanes.place(own)
             };
         }
+        node += 1;
     }
     Made { nodes, packets: lanes.used.div_ceil(LANES), levels }
 }
