@@ -35,6 +35,9 @@ const NONE: u32 = u32::MAX;
 /// Facets a leaf holds at most, and the width of a packet.
 const LANES: usize = 4;
 
+/// Entries of a stack that the deepest tree needs: seven for each of at most 69 levels, and one.
+const STACK: usize = 512;
+
 /// Facet count is kept below this, so that lane and node numbers fit beside the bits of a child.
 const MOST: usize = 1 << 28;
 

@@ -8,7 +8,7 @@
 //! of the origin to f32 and the effect of replacing small direction components; its subtraction therefore has the
 //! right sign, and what is left is three roundings of 2^-24 relative, which [`WIDEN`] covers.
 
-use super::{Boxes, Bvh, LEAF, PAIR, Packet};
+use super::{Boxes, Bvh, LEAF, PAIR, Packet, STACK};
 use crate::math::{Vec3, fabs};
 use crate::ray::{Hit, Line, Ray};
 use crate::simd::{self, LaneTask, Lanes};
@@ -22,9 +22,6 @@ const SMALLEST: f64 = 1e-18;
 
 /// Entries of the short stack, enough for nine levels of nodes.
 const SHORT: usize = 64;
-
-/// Entries that the deepest tree needs: seven a level, at most 69 levels.
-const LONG: usize = 512;
 
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
@@ -50,7 +47,7 @@ impl<const ANY: bool> LaneTask for Search<'_, ANY> {
         if self.bvh.levels * 7 < SHORT {
             Walk::new(self.bvh, self.ray)?.search::<L, ANY, SHORT>(lanes)
         } else {
-            Walk::new(self.bvh, self.ray)?.search::<L, ANY, LONG>(lanes)
+            Walk::new(self.bvh, self.ray)?.search::<L, ANY, STACK>(lanes)
         }
     }
 }
