@@ -213,8 +213,8 @@ impl Solved<'_> {
         if let Some(sky) = &self.light.sky {
             let mut radiance = [0.0; MAX_BANDS];
             sky.radiance(leg.ray.direction, &mut radiance[..bands]);
-            for band in 0..bands {
-                terms.mirror_sky[band] += leg.through[band] * radiance[band];
+            for (band, l) in radiance[..bands].iter().enumerate() {
+                terms.mirror_sky[band] += leg.through[band] * l;
             }
         }
         if let Some(sun) = &self.light.sun

@@ -93,6 +93,10 @@ impl Shape {
 /// # Errors
 /// [`Error::Length`] for a table of the wrong size; [`Error::Mismatch`] where the sky is not uniform and the
 /// coupling kept no directions.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a stage's result or a range of it, as in the other stages"
+)]
 pub fn sky_rows(
     scene: &Scene<'_>,
     elements: &Elements<'_>,
