@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn directions_survive_packing() {
         for i in 0..1000 {
-            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.0021 - 1.0);
+            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.002 - 1.0);
             let s = crate::math::sqrt(1.0 - b * b);
             let d = Vec3::new(s * crate::math::cos(a), s * crate::math::sin(a), b);
             // two steps of 2^-22 on the octahedron, stretched by at most sqrt 3 on the sphere
