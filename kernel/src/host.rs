@@ -278,7 +278,7 @@ impl Host {
             return Ok(0);
         }
         let tolerance = geometry.settings.tolerance;
-        let rays = (500.0 / tolerance).clamp(65536.0, 1e8);
+        let rays = (100.0 / tolerance).clamp(32768.0, 1e8);
         let mirrors =
             geometry.settings.max_bounces.unwrap_or(u32::MAX).min(crate::coupling::word::LONGEST as u32);
         let settings = BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors);
