@@ -7,7 +7,7 @@ use crate::bvh::Bvh;
 use crate::element::MAX_DIVISIONS;
 use crate::error::Error;
 use crate::math::{Vec3, frame};
-use crate::mirror::Surface;
+use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -33,6 +33,9 @@ pub fn probe(scene: &Scene<'_>, bvh: &Bvh<'_>, range: Range<usize>, out: &mut [f
             continue;
         }
         for side in 0..scene.sides() {
+            if opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
+                continue;
+            }
             let blocked = probe_side(scene, bvh, facet, side, &mut rays);
             *value = f64::max(*value, unevenness(&blocked));
         }
