@@ -8,12 +8,12 @@
 
 use super::sink::Sink;
 use super::word::EMPTY;
-use super::{BLOCKED, Record, Row};
+use super::{BLOCKED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::{Elements, Local};
 use crate::error::Error;
 use crate::math::{Vec3, frame, pow};
-use crate::mirror::Surface;
+use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -37,7 +37,7 @@ pub struct RowSettings {
 pub const MOST_RAYS: u32 = 1 << 16;
 
 impl RowSettings {
-    /// Settings for a tolerance: a row's error, about 0.6 n^-2/3 at its worst, times the diffuse reflectance is
+    /// Settings for a tolerance: a row's error, about 0.4 n^-2/3 at its worst, times the diffuse reflectance is
     /// kept at the tolerance.
     pub fn new(
         scene: &Scene<'_>,
@@ -47,7 +47,7 @@ impl RowSettings {
         all: bool,
     ) -> Self {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
-        let wanted = pow(0.6 * diffuse / tolerance, 1.5);
+        let wanted = pow(0.4 * diffuse / tolerance, 1.5);
         let rays =
             if wanted < 64.0 { 64 } else { (wanted.min(f64::from(MOST_RAYS)) as u32).next_power_of_two() };
         let longest = super::word::LONGEST as u32;
@@ -126,11 +126,16 @@ impl Tracer<'_, '_> {
             self.sink.end_row(0.0, Row::default());
             return Some(());
         }
+        let normal = self.scene.side_normal(facet, side);
+        if opens_to_sky(self.scene, self.bvh, facet, normal) {
+            self.sink.end_row(0.0, Row { state: OPEN, ..Row::default() });
+            return Some(());
+        }
         let start = Start {
             element: unknown / self.scene.sides(),
             facet,
             side,
-            frame: frame(self.scene.side_normal(facet, side)),
+            frame: frame(normal),
             sequence: Sequence::new(hash2(unknown as u32, 0x0b11_7000)),
         };
         // a small element varies little: its rays spread over two dimensions instead of four
@@ -153,6 +158,7 @@ impl Tracer<'_, '_> {
         self.sink.end_row(
             share,
             Row {
+                state: TRACED,
                 rays: tally.rays,
                 chain_rays: tally.chain_rays,
                 lost: tally.lost * share,
