@@ -37,7 +37,7 @@ pub struct RowSettings {
 pub const MOST_RAYS: u32 = 1 << 16;
 
 impl RowSettings {
-    /// Settings for a tolerance: a row's error, about 0.4 n^-2/3 at its worst, times the diffuse reflectance is
+    /// Settings for a tolerance: a row's error, about 0.6 n^-2/3 at its worst, times the diffuse reflectance is
     /// kept at the tolerance.
     pub fn new(
         scene: &Scene<'_>,
@@ -47,7 +47,7 @@ impl RowSettings {
         all: bool,
     ) -> Self {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
-        let wanted = pow(0.4 * diffuse / tolerance, 1.5);
+        let wanted = pow(0.6 * diffuse / tolerance, 1.5);
         let rays =
             if wanted < 64.0 { 64 } else { (wanted.min(f64::from(MOST_RAYS)) as u32).next_power_of_two() };
         let longest = super::word::LONGEST as u32;
