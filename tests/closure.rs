@@ -1,8 +1,8 @@
 //! The coupling's rows close: what an element sees is facets, blacks and sky, and nothing is lost or seen twice.
 
-mod support;
 #[path = "support/case.rs"]
 mod case;
+mod support;
 
 use blik_kernel::coupling::{BLOCKED, RowView};
 use case::{Case, within};
@@ -22,11 +22,16 @@ fn shares(row: &RowView<'_>) -> Shares {
     Shares {
         straight: sum(&mut row.targets.iter().filter(|r| row.depth(r) == 0).map(|r| r.weight)),
         blocked: sum(&mut row.escapes.iter().filter(|r| r.word() == BLOCKED).map(|r| r.weight)),
-        mirrored: sum(
-            &mut row.targets.iter().filter(|r| row.depth(r) > 0).map(|r| r.weight * row.products(r)[0]),
-        ) + sum(
-            &mut row.escapes.iter().filter(|r| r.word() != BLOCKED).map(|r| r.weight * row.products(r)[0]),
-        ),
+        mirrored: sum(&mut row
+            .targets
+            .iter()
+            .filter(|r| row.depth(r) > 0)
+            .map(|r| r.weight * row.products(r)[0]))
+            + sum(&mut row
+                .escapes
+                .iter()
+                .filter(|r| r.word() != BLOCKED)
+                .map(|r| r.weight * row.products(r)[0])),
     }
 }
 
@@ -159,7 +164,8 @@ fn couplings_are_reciprocal_straight_and_through_mirrors() {
                 // and a few rays where a handful decide
                 let slack = 5.0 * error + 4.0 * (area(i) / rays[i] + area(j) / rays[j]);
                 assert!(difference.abs() < slack, "{name}, {i} {j}: {there} {back}");
-                (square, stated, pairs) = (square + difference * difference, stated + error * error, pairs + 1);
+                (square, stated, pairs) =
+                    (square + difference * difference, stated + error * error, pairs + 1);
             }
             let ratio: f64 = (square / stated).sqrt();
             println!("{name}: rms of {pairs} pairs {ratio} of independent rays' error");

@@ -1,8 +1,8 @@
 //! Energy: diffuse facets and flat ideal mirrors send out what they receive and do not absorb, and no more.
 
-mod support;
 #[path = "support/case.rs"]
 mod case;
+mod support;
 
 use blik_kernel::host::Settings;
 use blik_kernel::math::Vec3;
@@ -56,7 +56,11 @@ fn sent(case: &Case, settings: &Settings) -> f64 {
 
 fn bodies() -> Vec<(&'static str, Mesh, bool)> {
     let pieces = scenes::corner(1).joined(&scenes::cube_outside().scaled(0.3).translated([0.5, 0.4, 0.35]));
-    vec![("corner", scenes::corner(2), true), ("pieces", pieces, true), ("box", scenes::box_open(1.0, 1.0, 0.6, 1), true)]
+    vec![
+        ("corner", scenes::corner(2), true),
+        ("pieces", pieces, true),
+        ("box", scenes::box_open(1.0, 1.0, 0.6, 1), true),
+    ]
 }
 
 /// Diffuse, mixed, mirror.
@@ -70,7 +74,8 @@ fn what_a_uniform_sky_sends_is_absorbed_or_sent_back() {
         let mut case = Case::new(mesh, &materials()).sky(SkyOf::uniform(1));
         case.two_sided = two_sided;
         let settings = all(1e-2);
-        let (into, kept, out) = (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
+        let (into, kept, out) =
+            (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
         println!("{name}: in {into}, absorbed {kept}, sent {out}, balance {}", (kept + out) / into - 1.0);
         // 1.6 % for the directions at worst, the tolerance for each of both fluxes
         assert!((kept + out - into).abs() < 0.03 * into, "{name}");
@@ -85,7 +90,8 @@ fn what_the_sun_sends_is_absorbed_or_sent_back_by_diffuse_facets() {
         let mut case = Case::new(mesh, &diffuse).sun(SunOf::new([0.5, 0.35, 0.8], &[2.0], 0.0));
         case.two_sided = two_sided;
         let settings = all(1e-2);
-        let (into, kept, out) = (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
+        let (into, kept, out) =
+            (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
         println!("{name}: in {into}, absorbed {kept}, sent {out}, balance {}", (kept + out) / into - 1.0);
         // as above; an element in half shadow brings another 1.6 % of its flux
         assert!((kept + out - into).abs() < 0.04 * into, "{name}");
@@ -111,7 +117,8 @@ fn no_pixel_outshines_the_sky() {
     for (name, mesh, two_sided) in bodies() {
         let mut case = Case::new(mesh, &materials()).sky(SkyOf::uniform(1));
         case.two_sided = two_sided;
-        let outcome = case.run(2, &within(5e-3), &case::orthographic([3.0, 2.0, 2.5], [0.4, 0.4, 0.3], 2.5, 48));
+        let outcome =
+            case.run(2, &within(5e-3), &case::orthographic([3.0, 2.0, 2.5], [0.4, 0.4, 0.3], 2.5, 48));
         let brightest = outcome.image.pixels.iter().fold(0.0f32, |a, &b| a.max(b));
         // where gradients are noise they are damped, not gone
         assert!(brightest <= 1.0 + 5e-3, "{name}: {brightest}");
@@ -126,7 +133,8 @@ fn a_beam_keeps_its_flux() {
     for (direction, specular) in [([1.0, 0.0, 0.999], 0.9), ([s, 0.0, c * 0.5], 0.35)] {
         for two_sided in [false, true] {
             let materials = [Material::new(0.5, 0.0), Material::new(0.0, specular)];
-            let mut case = Case::new(scenes::wall_on_mirror(), &materials).sun(SunOf::new(direction, &[3.0], 0.0));
+            let mut case =
+                Case::new(scenes::wall_on_mirror(), &materials).sun(SunOf::new(direction, &[3.0], 0.0));
             case.two_sided = two_sided;
             let length = Vec3::from_array(direction).length();
             let (wall, floor) = (direction[0] / length, direction[2] / length);

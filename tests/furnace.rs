@@ -1,8 +1,8 @@
 //! The white furnace: where everything reflects all light and the sky is 1, nothing can be told from the sky.
 
-mod support;
 #[path = "support/case.rs"]
 mod case;
+mod support;
 
 use blik_kernel::camera::{CameraInput, Sampling};
 use case::{Case, SkyOf, orthographic, perspective, within};
@@ -28,7 +28,11 @@ fn all_is(what: &str, case: &Case, (tolerance, cut): (f64, f64), camera: &Camera
     for side in &outcome.sides {
         let off = (side.irradiance[0] / PI - truth).abs();
         // sides that reflect nothing diffusely have no row
-        assert!(side.irradiance[0] == 0.0 || off <= slack, "{what}: facet {} is off by {off:.2e}", side.facet);
+        assert!(
+            side.irradiance[0] == 0.0 || off <= slack,
+            "{what}: facet {} is off by {off:.2e}",
+            side.facet
+        );
     }
     assert!(outcome.image.report.signature.projected_area > 0.0, "{what}: something is seen");
 }

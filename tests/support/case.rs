@@ -94,7 +94,8 @@ impl Outcome {
 
     /// The bits of all irradiances and diffuse radiances.
     pub fn facet_bits(&self) -> Vec<u64> {
-        let values = |s: &Side| s.irradiance.iter().chain(&s.radiance).map(|x| x.to_bits()).collect::<Vec<_>>();
+        let values =
+            |s: &Side| s.irradiance.iter().chain(&s.radiance).map(|x| x.to_bits()).collect::<Vec<_>>();
         self.sides.iter().flat_map(values).collect()
     }
 }
@@ -108,7 +109,15 @@ impl Case {
     /// One-sided facets in the dark; `materials[mesh.materials[f]]` is the material of facet f.
     pub fn new(mesh: Mesh, materials: &[Material]) -> Case {
         let materials = materials.to_vec();
-        Case { mesh, materials, gloss_rays: None, normals: Vec::new(), two_sided: false, sky: None, sun: None }
+        Case {
+            mesh,
+            materials,
+            gloss_rays: None,
+            normals: Vec::new(),
+            two_sided: false,
+            sky: None,
+            sun: None,
+        }
     }
 
     pub fn sky(mut self, sky: SkyOf) -> Case {
@@ -157,7 +166,12 @@ impl Case {
     }
 
     /// Calls `with` with the scene's geometry, coupling included.
-    pub fn with_geometry<R>(&self, threads: usize, settings: &Settings, with: impl FnOnce(&Host, &Geometry<'_>) -> R) -> R {
+    pub fn with_geometry<R>(
+        &self,
+        threads: usize,
+        settings: &Settings,
+        with: impl FnOnce(&Host, &Geometry<'_>) -> R,
+    ) -> R {
         let host = Host::new(threads).unwrap();
         let mut memory = GeometryMemory::default();
         self.with_input(|input| {
@@ -167,7 +181,12 @@ impl Case {
     }
 
     /// Calls `with` with the solved scene.
-    pub fn with_lit<R>(&self, threads: usize, settings: &Settings, with: impl FnOnce(&Host, &Lit<'_>) -> R) -> R {
+    pub fn with_lit<R>(
+        &self,
+        threads: usize,
+        settings: &Settings,
+        with: impl FnOnce(&Host, &Lit<'_>) -> R,
+    ) -> R {
         self.with_geometry(threads, settings, |host, geometry| {
             let (sky, sun) = (self.sky.as_ref().map(SkyOf::input), self.sun.as_ref().map(SunOf::input));
             let lit = host.light(geometry, sky.as_ref(), sun.as_ref()).unwrap();

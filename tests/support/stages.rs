@@ -212,8 +212,16 @@ pub fn run(
     let mut reference = [0.0; MAX_BANDS];
     light.reference_radiance(&scene, &mut reference[..shape.bands]);
     let reference = &reference[..shape.bands];
-    let stage =
-        Stage { scene: &scene, bvh: &bvh, elements: &elements, coupling: &coupling, light: &light, shape, reference, plan };
+    let stage = Stage {
+        scene: &scene,
+        bvh: &bvh,
+        elements: &elements,
+        coupling: &coupling,
+        light: &light,
+        shape,
+        reference,
+        plan,
+    };
     stage.shine(&mut work.tables, &mut work.beams, &mut counts)?;
     let brightest = stage.solve(&mut work.tables, &mut counts)?;
     stage.view(&work.tables, brightest, camera, &mut work.view, &mut counts)?;
@@ -251,7 +259,8 @@ impl Stage<'_> {
             counts.sun += light::sun_rows(scene, bvh, elements, sun, range, out)?;
             Ok(())
         })?;
-        let settings = BeamSettings::new(scene, sun, (500.0 / tolerance).clamp(65536.0, 1e8), 1e-3 * tolerance, 1000);
+        let settings =
+            BeamSettings::new(scene, sun, (500.0 / tolerance).clamp(65536.0, 1e8), 1e-3 * tolerance, 1000);
         let mirrors = scene.facets() * scene.sides();
         let blocks = fill_blocks(parts, mirrors, beams, |range, memory| {
             beam::fill(scene, bvh, elements, sun, &settings, range, memory)
@@ -356,7 +365,9 @@ impl Stage<'_> {
             counts.image.add(&image::rows(&solved, &camera, range, &mut target, scratch)?);
         }
         let view = View::new(&solved, camera.forward(), out.sums.len())?;
-        split(parts, view.rows(), 1, &mut out.sums, |range, out| signature::rows(&solved, &view, range, out))?;
+        split(parts, view.rows(), 1, &mut out.sums, |range, out| {
+            signature::rows(&solved, &view, range, out)
+        })?;
         let mut sums = Sums::ZERO;
         out.sums.iter().for_each(|row| sums.add(row));
         (counts.projected_area, counts.signature_rays) = (sums.area, sums.rays);
