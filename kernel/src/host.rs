@@ -396,8 +396,10 @@ impl Host {
         report.bytes.image = 4 * (size + 3 * part);
         let (signature, rays) = self.signature(lit, camera.forward())?;
         report.signature = signature;
-        report.rays.primary = tally.primary;
-        report.rays.chain += tally.chain + rays;
+        // the signature's rays: one toward each cell, the rest in chains
+        let cells = lit.geometry.settings.signature_cells().pow(2) as u64;
+        report.rays.primary = tally.primary + cells;
+        report.rays.chain += tally.chain + rays - cells;
         report.seconds.image = clock.lap();
         report.finish(&tally);
         Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
@@ -412,7 +414,8 @@ impl Host {
         terms: &mut [Vec<f32>; 3],
     ) -> Result<Tally, Error> {
         let (rows, bands) = (camera.rows(), solved.shape.bands);
-        let piece = rows.div_ceil(16 * self.pool.current_num_threads()).max(4);
+        // the same pieces for any number of threads, so that counts and sums over pixels are the same too
+        let piece = rows.div_ceil(128).max(4);
         let chunk = piece * camera.columns() * bands;
         let scratch = image::scratch_bytes(camera, bands)?;
         let mut parts = terms.each_mut().map(|t| t.chunks_mut(chunk));
