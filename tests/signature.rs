@@ -1,0 +1,138 @@
+//! Radiant intensity, projected area, mean radiance and contrast against values by hand, whatever the camera's window.
+
+#[path = "support/kernel.rs"]
+mod kernel;
+mod support;
+
+use blik_kernel::camera::{CameraInput, Projection, Sampling};
+use blik_kernel::host::SignatureReport;
+use blik_kernel::math::Vec3;
+use blik_kernel::signature::{Signature, Sums};
+use glam::dvec3;
+use kernel::{solve, within};
+use std::f64::consts::PI;
+use support::scenes;
+use support::twin::{Material, Model, Scene, Sky, Sun};
+
+/// Relative error of an outline by 158^2 rays, the count at the default tolerance: about n^-3/2, here twice that.
+const OUTLINE: f64 = 1e-3;
+
+#[track_caller]
+fn close(what: &str, value: f64, truth: f64, tolerance: f64) {
+    println!("{what}: {value}, truth {truth}, off by {:.1e} of {tolerance:.1e}", (value - truth).abs());
+    assert!((value - truth).abs() <= tolerance, "{what}: {value}, not {truth}");
+}
+
+fn signature(scene: &Scene, forward: [f64; 3]) -> SignatureReport {
+    solve(scene, &within(2e-3), |host, lit| host.signature(lit, Vec3::from_array(forward)).unwrap().0)
+}
+
+#[test]
+fn a_cube_face_on_and_edge_on() {
+    // two bands: diffuse 0.4 and 0.1, under a sky of 1 and 2 above the horizon and 0 below, sun of pi and 0 overhead
+    let material = Material::spectral(&[0.4, 0.1], &[0.0, 0.0]);
+    let mesh = scenes::cube_outside().scaled(3.0).translated([100.0, -20.0, 7.0]);
+    let sky =
+        Sky { radiance: vec![1.0, 2.0], ground: vec![0.0, 0.0], ..Sky::new(Model::Hemisphere, 0.0, 0.0) };
+    let sun = Sun { irradiance: vec![PI, 0.0], ..Sun::new(dvec3(0.0, 0.0, 1.0), 1.0, 0.0) };
+    let scene = Scene::new(&mesh, &[material]).sky(sky).sun(sun);
+    // top: 0.4 (1 + 1) and 0.1 x 2; against the ground's radiance of 0 there is no contrast
+    let top = signature(&scene, [0.0, 0.0, -2.0]);
+    // the grid covers the face exactly: every ray meets it
+    close("top, area", top.projected_area, 9.0, 1e-12);
+    // closed forms of sky and sun, to a few roundings
+    close("top, band 0", top.mean_radiance[0], 0.8, 1e-12);
+    close("top, band 1", top.mean_radiance[1], 0.2, 1e-12);
+    close("top, intensity", top.radiant_intensity[0], 7.2, 1e-11);
+    assert_eq!(top.contrast, [None, None]);
+    // from below, black against the sky overhead
+    let below = signature(&scene, [0.0, 0.0, 1.0]);
+    close("below, intensity", below.radiant_intensity[1], 0.0, 1e-12);
+    close("below, contrast", below.contrast[1].unwrap(), -1.0, 1e-12);
+    // a side sees half of the sky and none of the sun, and has the horizon behind it, which counts as sky
+    let side = signature(&scene, [1.0, 0.0, 0.0]);
+    close("side, band 0", side.mean_radiance[0], 0.2, 1e-12);
+    close("side, contrast", side.contrast[0].unwrap(), -0.8, 1e-12);
+    // edge-on and corner-on: a rectangle and a hexagon that the grid's axes cross
+    for (forward, area) in [([1.0, 1.0, 0.0], 9.0 * 2f64.sqrt()), ([1.0, 1.0, 1.0], 9.0 * 3f64.sqrt())] {
+        close("outline", signature(&scene, forward).projected_area, area, OUTLINE * area);
+    }
+    // two sides alike
+    let edge = signature(&scene, [1.0, 1.0, 0.0]);
+    close("edge, band 1", edge.mean_radiance[1], 0.1, 1e-12);
+}
+
+#[test]
+fn a_sphere_from_everywhere() {
+    let mesh = scenes::sphere(4);
+    let scene =
+        Scene::new(&mesh, &[Material::new(0.25, 0.0).emitting(0.5)]).sky(Sky::new(Model::Uniform, 2.0, 2.0));
+    for forward in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.2], [-3.0, 2.0, -1.0]] {
+        let report = signature(&scene, forward);
+        // the convex mesh's own outline
+        let forward = dvec3(forward[0], forward[1], forward[2]).normalize();
+        let seen = |f: usize| scene.areas[f] * (-scene.normals[f].dot(forward)).max(0.0);
+        let area = (0..scene.areas.len()).map(seen).sum::<f64>();
+        close("area", report.projected_area, area, OUTLINE * area);
+        // 0.5 + 0.25 x 2 everywhere
+        close("mean radiance", report.mean_radiance[0], 1.0, 1e-12);
+        close("contrast", report.contrast[0].unwrap(), -0.5, 1e-12);
+        close("intensity", report.radiant_intensity[0], report.projected_area, 1e-12);
+    }
+}
+
+#[test]
+fn the_window_of_the_camera_does_not_matter() {
+    let scene = Scene::new(&scenes::corner(2).of_material(0), &[Material::new(0.4, 0.3)])
+        .two_sided(true)
+        .sky(Sky::new(Model::Overcast, 1.0, 0.2));
+    let camera = CameraInput {
+        projection: Projection::Orthographic { height: 3.0 },
+        eye: [4.0, 3.0, 2.0],
+        target: [0.5, 0.5, 0.5],
+        up: [0.0, 0.0, 1.0],
+        columns: 12,
+        rows: 12,
+        sampling: Sampling::Centre,
+    };
+    // half of the object, a speck beside it, other pixels, another kind of camera with the same middle
+    let shifted = |by: f64| [camera.eye, camera.target].map(|p| [p[0], p[1], p[2] + by]);
+    let [eye, target] = shifted(50.0);
+    let cameras = [
+        camera,
+        CameraInput { projection: Projection::Orthographic { height: 0.5 }, ..camera },
+        CameraInput { eye, target, ..camera },
+        CameraInput { columns: 40, rows: 3, sampling: Sampling::Area, ..camera },
+        CameraInput { projection: Projection::Perspective { fov_deg: 5.0 }, ..camera },
+    ];
+    let direct = signature(&scene, [-3.5, -2.5, -1.5]);
+    assert!(direct.projected_area > 1.0 && direct.radiant_intensity[0] > 0.1);
+    solve(&scene, &within(2e-3), |host, lit| {
+        let first = host.image(lit, &cameras[0], false).unwrap().report.signature;
+        for (index, camera) in cameras.iter().enumerate() {
+            let report = host.image(lit, camera, false).unwrap().report.signature;
+            if index == 2 {
+                // the same direction but for the rounding of coordinates near 50
+                close("shifted", report.radiant_intensity[0], first.radiant_intensity[0], 1e-6);
+            } else {
+                assert_eq!(report, first, "camera {index}");
+            }
+        }
+        // and it is that of the direction alone
+        close("direct", first.radiant_intensity[0], direct.radiant_intensity[0], 1e-6);
+    });
+}
+
+#[test]
+fn the_numbers_follow_from_the_sums() {
+    let mut sums = Sums { area: 2.0, ..Sums::ZERO };
+    sums.intensity[1] = 3.0;
+    sums.add(&Sums { area: 2.0, rays: 7, ..Sums::ZERO });
+    assert_eq!(sums.rays, 7);
+    let of = Signature::new(&sums, 1, 0.25);
+    assert_eq!(of, Signature { intensity: 3.0, mean_radiance: 0.75, contrast: Some(2.0) });
+    // nothing is seen: no mean, and a contrast of -1
+    let none = Signature::new(&Sums::ZERO, 0, 0.25);
+    assert_eq!(none, Signature { intensity: 0.0, mean_radiance: 0.0, contrast: Some(-1.0) });
+    assert_eq!(Signature::new(&sums, 1, 0.0).contrast, None);
+}
