@@ -55,7 +55,7 @@ fn agree(what: &str, a: &Outcome, b: &Outcome) {
         difference <= 2.0 * first.hypot(second),
         "{what}: {difference:.2e}, estimates {first:.1e} {second:.1e}"
     );
-    assert!(first.max(second) <= 2.0 * TOLERANCE, "{what}: the estimate says something");
+    assert!(first.max(second) <= 3.0 * TOLERANCE, "{what}: the estimate says something");
 }
 
 /// The same bits in all pixels, components, irradiances and radiances.

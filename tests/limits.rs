@@ -195,7 +195,7 @@ fn no_diffuse_facets_no_rows() {
         let report = lit.report();
         assert_eq!(skipped(lit, "black or degenerate rows"), report.elements as u64);
         assert_eq!((report.rays.visibility, report.pairs.sampled, report.elements), (0, 0, 24));
-        // no facet takes up what mirrors throw: at most 256 shadow rays a facet, none of the 65536 of the beams
+        // no facet takes up what mirrors throw: at most 256 shadow rays a facet, none of the beams
         assert!(report.rays.sun <= 24 * 256, "{} rays toward the sun", report.rays.sun);
     });
     // where irradiances are asked for, no side is skipped
@@ -226,14 +226,13 @@ fn no_sun_no_sun_rays_and_no_sky_no_light() {
 }
 
 #[test]
-fn a_convex_body_needs_few_rays() {
+fn a_convex_body_needs_no_rays() {
     let body: Mesh = scenes::sphere(1);
     let facets = body.facets.len() as u64;
     let case = Case::new(body, &[Material::new(0.5, 0.0)]).sky(SkyOf::uniform(1));
     case.with_lit(2, &within(1e-3), |_, lit| {
-        assert_eq!(skipped(lit, "unblocked rows"), facets);
-        // a quarter of the 256 probing rays, and the least share of a row's 8192, 1/16
-        assert!(lit.report().rays.visibility <= facets * (64 + 512), "{}", lit.report().rays.visibility);
+        assert_eq!(skipped(lit, "rows open to the sky alone"), facets);
+        assert_eq!((lit.report().rays.visibility, lit.report().pairs.sampled), (0, 0));
     });
 }
 

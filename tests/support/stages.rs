@@ -1,6 +1,8 @@
 //! The kernel's stages from a mesh to its image in memory made beforehand, each cut into as many ranges as wanted.
 //!
-//! Nothing in [`run`] allocates, and each stage is given exactly the bytes that it asks for.
+//! Nothing in [`run`] allocates, and each stage is given exactly the bytes that it asks for. What the owning layer
+//! decides (rays of beams, end of the sweeps, brightest radiance) is decided here as it does, so that results agree
+//! bit for bit.
 #![allow(dead_code)]
 
 use blik_kernel::Error;
@@ -260,7 +262,7 @@ impl Stage<'_> {
             Ok(())
         })?;
         let settings =
-            BeamSettings::new(scene, sun, (500.0 / tolerance).clamp(65536.0, 1e8), 1e-3 * tolerance, 1000);
+            BeamSettings::new(scene, sun, (100.0 / tolerance).clamp(32768.0, 1e8), 1e-3 * tolerance, 1000);
         let mirrors = scene.facets() * scene.sides();
         let blocks = fill_blocks(parts, mirrors, beams, |range, memory| {
             beam::fill(scene, bvh, elements, sun, &settings, range, memory)
@@ -317,7 +319,7 @@ impl Stage<'_> {
         let mut largest = [0.0; MAX_BANDS];
         self.light.largest_radiance(&mut largest[..bands]);
         if let Some(sun) = &self.light.sun {
-            (0..bands).for_each(|b| largest[b] = f64::max(largest[b], sun.disc_radiance(b)));
+            (0..bands).for_each(|b| largest[b] += sun.disc_radiance(b));
         }
         for values in radiance.chunks_exact(bands) {
             largest.iter_mut().zip(values).for_each(|(l, &v)| *l = l.max(v));
