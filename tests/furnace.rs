@@ -119,7 +119,7 @@ fn interpolated_normals_keep_the_furnace() {
     // a convex body: the mirror direction, kept above the facet, always meets the sky
     for material in white() {
         let mesh = scenes::sphere(1);
-        let mut case = Case::new(mesh.clone(), &[material.clone()]).sky(SkyOf::uniform(1));
+        let mut case = Case::new(mesh.clone(), std::slice::from_ref(&material)).sky(SkyOf::uniform(1));
         case.normals = mesh.vertices;
         for camera in views([3.0, 2.0, 2.5], [0.0; 3]) {
             all_is("smooth sphere", &case, EXACT, &camera, 1.0);
