@@ -10,7 +10,7 @@ use crate::bvh::Bvh;
 use crate::coupling::rows::lobe_point;
 use crate::coupling::sink::Sink;
 use crate::coupling::word::EMPTY;
-use crate::coupling::{Coupling, Record, Row};
+use crate::coupling::{Coupling, Record, Row, TRACED};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::light::Shape;
@@ -103,7 +103,7 @@ impl Tracer<'_, '_> {
         let wanted = (area * self.settings.density).clamp(RAYS.0, RAYS.1);
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
-        let mut stats = Row { rays, ..Row::default() };
+        let mut stats = Row { state: TRACED, rays, ..Row::default() };
         for index in 0..rays {
             self.ray(facet, side, &sequence, index, &mut stats)?;
         }

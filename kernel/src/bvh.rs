@@ -1,9 +1,10 @@
 //! The bounding volume hierarchy: nodes of eight boxes, leaves of four facets, in caller memory.
 //!
 //! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
-//! reads it. Hits are those of [`ray::intersect`](crate::ray::intersect) over all facets, bit for bit: the least
+//! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least
 //! `t`, ties to the lowest facet index, whatever the builder and the instruction set.
 
+mod above;
 mod build;
 mod collapse;
 #[cfg(feature = "std")]
@@ -179,6 +180,12 @@ impl<'m> Bvh<'m> {
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
         traverse::occluded(self, ray)
+    }
+
+    /// Whether any corner of a facet that rays can meet lies above the plane of points p with p.normal = height.
+    /// Error: 3 roundings of a coordinate.
+    pub fn rises_above(&self, normal: Vec3, height: f64) -> bool {
+        above::rises_above(self, normal, height)
     }
 
     /// The lowest and the highest coordinates of the facets that rays can meet; zeros where there is none.

@@ -90,6 +90,30 @@ pub struct Path {
     pub noise: f64,
 }
 
+/// Which ray of an image it is, so that lobes and penumbrae of different rays are sampled apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sample {
+    /// A ray that stands for itself: lobes and penumbrae are integrated.
+    Alone(u32),
+    /// Ray number `index` of those that `seed` names and whose mean counts: one point of the sun's disc each.
+    OneOf {
+        /// Names the rays.
+        seed: u32,
+        /// This ray among them.
+        index: u32,
+    },
+}
+
+impl Sample {
+    /// A number for the sequences of one ray.
+    fn seed(self) -> u32 {
+        match self {
+            Sample::Alone(seed) => seed,
+            Sample::OneOf { seed, index } => hash2(seed, index + 1),
+        }
+    }
+}
+
 /// A chain on its way.
 struct Leg {
     ray: Ray,
@@ -101,13 +125,15 @@ struct Leg {
     lobe: bool,
 }
 
+/// Rays toward the sun's disc: all of the first few agree, or so many are taken.
+const DISC_RAYS: (u32, u32) = (4, 32);
+
 /// The most rays of one lobe.
 const MOST_LOBE_RAYS: f64 = 1024.0;
 
 impl Solved<'_> {
-    /// Radiance against `ray`, added to `terms` (cleared by the caller). `sample` names the ray among those of
-    /// an image, so that lobes and penumbrae of different rays are sampled apart.
-    pub fn radiance(&self, ray: &Ray, sample: u32, terms: &mut Terms) -> Path {
+    /// Radiance against `ray`, added to `terms` (cleared by the caller).
+    pub fn radiance(&self, ray: &Ray, sample: Sample, terms: &mut Terms) -> Path {
         let mut path = Path::default();
         let bands = self.shape.bands;
         let mut leg = Leg { ray: *ray, through: [0.0; MAX_BANDS], mirrors: 0, lobe: false };
@@ -117,7 +143,7 @@ impl Solved<'_> {
     }
 
     /// Follows a chain to its end; the first lobe branches if `branch`, all others take one ray.
-    fn follow(&self, mut leg: Leg, sample: u32, branch: bool, terms: &mut Terms, path: &mut Path) {
+    fn follow(&self, mut leg: Leg, sample: Sample, branch: bool, terms: &mut Terms, path: &mut Path) {
         loop {
             let Some(hit) = self.bvh.closest(&leg.ray) else {
                 self.escape(&leg, terms);
@@ -156,7 +182,7 @@ impl Solved<'_> {
                         self.branch(&leg, &surface, &mirror, sample, terms, path);
                         return;
                     }
-                    let sequence = Sequence::new(hash2(sample, leg.mirrors));
+                    let sequence = Sequence::new(hash2(sample.seed(), leg.mirrors));
                     let (u, v) = sequence.pair(leg.mirrors, 0);
                     self.turn(&mut leg, &surface, &mirror, u, v);
                 }
@@ -178,7 +204,7 @@ impl Solved<'_> {
         leg: &Leg,
         surface: &Surface,
         mirror: &Mirror,
-        sample: u32,
+        sample: Sample,
         terms: &mut Terms,
         path: &mut Path,
     ) {
@@ -192,7 +218,7 @@ impl Solved<'_> {
             through[..self.shape.bands].iter_mut().for_each(|t| *t *= share);
             let next = Leg { ray: surface.leave(direction), through, mirrors: leg.mirrors, lobe: true };
             path.rays += 1;
-            self.follow(next, hash2(sample, i), false, terms, path);
+            self.follow(next, Sample::OneOf { seed: sample.seed(), index: i }, false, terms, path);
         }
     }
 
@@ -213,8 +239,8 @@ impl Solved<'_> {
         if let Some(sky) = &self.light.sky {
             let mut radiance = [0.0; MAX_BANDS];
             sky.radiance(leg.ray.direction, &mut radiance[..bands]);
-            for band in 0..bands {
-                terms.mirror_sky[band] += leg.through[band] * radiance[band];
+            for (band, l) in radiance[..bands].iter().enumerate() {
+                terms.mirror_sky[band] += leg.through[band] * l;
             }
         }
         if let Some(sun) = &self.light.sun
@@ -230,7 +256,7 @@ impl Solved<'_> {
 
     /// Diffuse radiance of a facet toward the chain.
     #[inline]
-    fn add_diffuse(&self, leg: &Leg, surface: &Surface, sample: u32, terms: &mut Terms, path: &mut Path) {
+    fn add_diffuse(&self, leg: &Leg, surface: &Surface, sample: Sample, terms: &mut Terms, path: &mut Path) {
         let bands = self.shape.bands;
         let to = if leg.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
         for (band, &own) in self.scene.emission(surface.material).iter().enumerate() {
@@ -264,9 +290,9 @@ impl Solved<'_> {
         path.noise += weight * f64::from(self.noise[unknown]);
     }
 
-    /// cos(sun) V at a point: one shadow ray for a point sun, 8 or 64 for a disc.
+    /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[inline]
-    fn sun_cosine(&self, surface: &Surface, sample: u32, path: &mut Path) -> f64 {
+    fn sun_cosine(&self, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
         let cosine = sun.cosine(surface.normal);
         if cosine <= 0.0 {
@@ -277,8 +303,11 @@ impl Solved<'_> {
             let shadow = self.bvh.occluded(&surface.leave(sun.direction()));
             return if shadow { 0.0 } else { cosine };
         }
-        let sequence = Sequence::new(hash2(sample, 0x0d15_c000));
-        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0u32, 8u32);
+        let (sequence, mut count, mut goal) = match sample {
+            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, DISC_RAYS.0),
+            Sample::OneOf { seed, index } => (Sequence::new(hash2(seed, 0x0d15_c000)), index, index + 1),
+        };
+        let (mut lit, mut all) = (0.0, 0.0);
         while count < goal {
             let (u, v) = sequence.pair(count, 0);
             let toward = sun.sample(u, v);
@@ -289,8 +318,8 @@ impl Solved<'_> {
                 path.rays += 1;
                 lit += if self.bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
             }
-            if count == 8 && lit != 0.0 && lit != all {
-                goal = 64;
+            if matches!(sample, Sample::Alone(_)) && count == DISC_RAYS.0 && lit != 0.0 && lit != all {
+                goal = DISC_RAYS.1;
             }
         }
         if all > 0.0 { cosine * (lit / all) } else { 0.0 }

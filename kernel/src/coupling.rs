@@ -33,16 +33,27 @@ plain_struct! {
         pub start: u32,
         /// First escape among the records.
         pub escapes: u32,
+        /// [`ABSENT`], [`OPEN`] or [`TRACED`].
+        pub state: u32,
         /// Rays traced.
         pub rays: u32,
-        /// Facet tests and chain rays.
+        /// Rays traced beyond the first hits.
         pub chain_rays: u32,
+        /// Keeps the size a multiple of eight.
+        pub unused: u32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
         /// Difference between the two halves of the row's rays, as a share of the hemisphere.
         pub spread: f64,
     }
 }
+
+/// State of a row that nothing needs: of a degenerate facet, or of one that reflects nothing diffusely.
+pub const ABSENT: u32 = 0;
+/// State of a row that sees nothing but the sky: nothing rises above its facet's plane.
+pub const OPEN: u32 = 1;
+/// State of a row whose rays were traced.
+pub const TRACED: u32 = 2;
 
 plain_struct! {
     /// The head of a block.
@@ -299,7 +310,7 @@ mod tests {
     #[test]
     fn directions_survive_packing() {
         for i in 0..1000 {
-            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.0021 - 1.0);
+            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.002 - 1.0);
             let s = crate::math::sqrt(1.0 - b * b);
             let d = Vec3::new(s * crate::math::cos(a), s * crate::math::sin(a), b);
             // two steps of 2^-22 on the octahedron, stretched by at most sqrt 3 on the sphere

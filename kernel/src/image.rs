@@ -2,7 +2,7 @@
 
 use crate::arena::{Arena, Need};
 use crate::camera::{Camera, Sampling};
-use crate::chain::{Solved, Terms};
+use crate::chain::{Sample, Solved, Terms};
 use crate::error::{Error, Field};
 use crate::math::{fabs, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
@@ -63,13 +63,18 @@ pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     Need::new().and::<f64>(3 * (camera.columns() + 2) * (3 * bands + 3)).bytes()
 }
 
-/// The most rays through one pixel.
+/// Fewest and most rays through a pixel that is sampled more than once.
+const FEWEST: u32 = 4;
 const MOST: u32 = 256;
+
+/// A pixel whose centre differs from its neighbours by at most this many tolerances keeps the centre's value: an
+/// edge of that contrast, on one pixel in five, brings an error of half the tolerance.
+const FLAT: f64 = 3.0;
 
 /// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
 ///
 /// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre differs
-/// from none of its eight neighbours by more than the tolerance keeps its centre's value; others get 16 to 256
+/// from none of its eight neighbours by more than three tolerances keeps its centre's value; others get 4 to 256
 /// rays, error about half the difference times n^-3/4.
 ///
 /// # Errors
@@ -145,7 +150,7 @@ impl Painter<'_, '_> {
                 self.note(at);
                 let index = (row - first) as usize * columns as usize + j as usize;
                 let contrast = self.contrast(row, j);
-                if contrast <= self.solved.settings.tolerance {
+                if contrast <= FLAT * self.solved.settings.tolerance {
                     self.write(target, index, at);
                 } else {
                     self.refine(target, index, row as usize, j as usize, contrast);
@@ -166,7 +171,8 @@ impl Painter<'_, '_> {
         for j in columns {
             let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
             self.terms.clear(bands);
-            let path = self.solved.radiance(&ray, hash2(row as u32, j as u32), &mut self.terms);
+            let path =
+                self.solved.radiance(&ray, Sample::Alone(hash2(row as u32, j as u32)), &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let at = self.slot(row, j);
@@ -232,13 +238,13 @@ impl Painter<'_, '_> {
         let sequence = Sequence::new(seed);
         let mut sums = Terms::ZERO;
         let (mut low, mut high) = ([f64::INFINITY; MAX_BANDS], [f64::NEG_INFINITY; MAX_BANDS]);
-        let (mut n, mut goal) = (0u32, 16u32);
+        let (mut n, mut goal) = (0u32, FEWEST);
         let mut error = 0.0;
         while n < goal {
             let (x, y) = sequence.pair(n, 0);
             let ray = self.camera.ray(column as f64 + x, row as f64 + y);
             self.terms.clear(bands);
-            let path = self.solved.radiance(&ray, hash2(seed, n + 1), &mut self.terms);
+            let path = self.solved.radiance(&ray, Sample::OneOf { seed, index: n }, &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             for band in 0..bands {
@@ -257,8 +263,8 @@ impl Painter<'_, '_> {
                         seen = seen.max(d / self.solved.reference[band]);
                     }
                 }
-                // what 16 rays have not seen of the neighbours' contrast is a corner of the pixel
-                error = 0.5 * seen.max(contrast / 16.0) * pow(f64::from(n), -0.75);
+                // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
+                error = 0.5 * seen.max(contrast / sqrt(f64::from(n))) * pow(f64::from(n), -0.75);
                 // a tenth of the pixels lies on edges: sqrt(10) times the tolerance there is the tolerance
                 if error > 2.0 * self.solved.settings.tolerance && goal < MOST {
                     goal *= 2;

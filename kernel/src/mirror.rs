@@ -1,5 +1,6 @@
 //! Where light goes on from a facet: the point, the side, and the mirror direction.
 
+use crate::bvh::Bvh;
 use crate::element::point;
 use crate::lobe::Lobe;
 use crate::math::{Vec3, reflect};
@@ -9,6 +10,12 @@ use crate::scene::{NO_MIRROR, Scene};
 /// Rays start this far off their facet (scene coordinates, in which the object fills [-1, 1]): some 256 times
 /// the rounding error of a point on a facet, and a tenth of the smallest gap that is told from contact.
 pub const OFFSET: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// True where nothing rises above the plane of a facet's side by as much as its rays start above it.
+pub fn opens_to_sky(scene: &Scene<'_>, bvh: &Bvh<'_>, facet: usize, normal: Vec3) -> bool {
+    let height = scene.corners()[facet].iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+    !bvh.rises_above(normal, height + 0.5 * OFFSET)
+}
 
 /// A point on a side of a facet that carries a material.
 #[derive(Clone, Copy, Debug)]

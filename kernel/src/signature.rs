@@ -1,7 +1,7 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
 
 use crate::camera::Camera;
-use crate::chain::{Solved, Terms};
+use crate::chain::{Sample, Solved, Terms};
 use crate::error::Error;
 use crate::math::{Vec3, frame, unit};
 use crate::qmc::{Sequence, hash2};
@@ -95,7 +95,8 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
             let origin = view.corner + view.right * (column as f64 + x) + view.up * (row as f64 + y);
             let ray = Ray::new(origin, view.forward);
             terms.clear(bands);
-            let path = solved.radiance(&ray, hash2(row as u32, column as u32), &mut terms);
+            let path =
+                solved.radiance(&ray, Sample::OneOf { seed: row as u32, index: column as u32 }, &mut terms);
             sums.rays += 1 + u64::from(path.rays);
             if path.object {
                 sums.area += area;

@@ -7,7 +7,7 @@ use crate::bvh::Bvh;
 use crate::element::MAX_DIVISIONS;
 use crate::error::Error;
 use crate::math::{Vec3, frame};
-use crate::mirror::Surface;
+use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -33,6 +33,9 @@ pub fn probe(scene: &Scene<'_>, bvh: &Bvh<'_>, range: Range<usize>, out: &mut [f
             continue;
         }
         for side in 0..scene.sides() {
+            if opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
+                continue;
+            }
             let blocked = probe_side(scene, bvh, facet, side, &mut rays);
             *value = f64::max(*value, unevenness(&blocked));
         }
@@ -109,8 +112,8 @@ fn unevenness(blocked: &[f64; BINS]) -> f64 {
 ///
 /// A jump leaves an error in the elements that it crosses, a share 1/S of them: the facet's part of the image's
 /// mean square error is a V rho^2/S with its share `a` of the area. The least number of elements for a given
-/// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what twice as many elements as
-/// there are facets (more for tolerances below 1e-3) reach.
+/// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what 1 + 2e-3/tolerance
+/// times as many elements as there are facets reach.
 pub fn divisions(
     scene: &Scene<'_>,
     unevenness: &[f64],
@@ -129,7 +132,7 @@ pub fn divisions(
     };
     let goal = 0.25 * tolerance * tolerance;
     let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;
-    let most = scene.facets() as f64 * (1.0 + (1e-3 / tolerance).max(1.0)) + 256.0;
+    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + 256.0;
     loop {
         let mut elements = 0.0;
         for (facet, s) in out.iter_mut().enumerate() {

@@ -8,12 +8,12 @@
 
 use super::sink::Sink;
 use super::word::EMPTY;
-use super::{BLOCKED, Record, Row};
+use super::{BLOCKED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::{Elements, Local};
 use crate::error::Error;
 use crate::math::{Vec3, frame, pow};
-use crate::mirror::Surface;
+use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -126,11 +126,16 @@ impl Tracer<'_, '_> {
             self.sink.end_row(0.0, Row::default());
             return Some(());
         }
+        let normal = self.scene.side_normal(facet, side);
+        if opens_to_sky(self.scene, self.bvh, facet, normal) {
+            self.sink.end_row(0.0, Row { state: OPEN, ..Row::default() });
+            return Some(());
+        }
         let start = Start {
             element: unknown / self.scene.sides(),
             facet,
             side,
-            frame: frame(self.scene.side_normal(facet, side)),
+            frame: frame(normal),
             sequence: Sequence::new(hash2(unknown as u32, 0x0b11_7000)),
         };
         // a small element varies little: its rays spread over two dimensions instead of four
@@ -153,6 +158,7 @@ impl Tracer<'_, '_> {
         self.sink.end_row(
             share,
             Row {
+                state: TRACED,
                 rays: tally.rays,
                 chain_rays: tally.chain_rays,
                 lost: tally.lost * share,

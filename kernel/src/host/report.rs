@@ -1,6 +1,6 @@
 //! What comes back with every result: how good it is, what was done, what was not needed.
 
-use crate::coupling::Coupling;
+use crate::coupling::{ABSENT, Coupling, OPEN};
 use crate::image::Tally;
 use crate::math::sqrt;
 use std::vec::Vec;
@@ -107,16 +107,16 @@ pub struct SignatureReport {
 impl Report {
     /// Counts what the coupling's rows did.
     pub(super) fn count_rows(&mut self, coupling: &Coupling<'_>) {
-        let (mut skipped, mut unblocked) = (0, 0);
+        let (mut skipped, mut open) = (0, 0);
         for (_, row) in coupling.rows(0..coupling.unknowns()) {
             self.rays.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
             self.pairs.sampled += row.targets.len() as u64;
             self.certified.dropped = self.certified.dropped.max(row.row.lost);
-            skipped += u64::from(row.row.rays == 0);
-            unblocked += u64::from(row.row.rays > 0 && row.escapes.is_empty());
+            skipped += u64::from(row.row.state == ABSENT);
+            open += u64::from(row.row.state == OPEN);
         }
         self.pairs.tested = self.pairs.sampled;
-        for (name, count) in [("black or degenerate rows", skipped), ("unblocked rows", unblocked)] {
+        for (name, count) in [("black or degenerate rows", skipped), ("rows open to the sky alone", open)] {
             if count > 0 {
                 self.skipped.push((name, count));
             }

@@ -1,0 +1,46 @@
+//! Whether anything of the mesh rises above a plane: if not, no ray that starts there and goes up meets anything.
+
+use super::{Bvh, LEAF, PAIR, STACK};
+use crate::math::Vec3;
+
+/// See [`Bvh::rises_above`].
+pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
+    let n = normal.to_array();
+    let mut stack = [0u32; STACK];
+    let mut top = usize::from(!bvh.boxes.is_empty());
+    while top > 0 {
+        top -= 1;
+        let node = stack[top] as usize;
+        let (Some(boxes), Some(children)) = (bvh.boxes.get(node), bvh.children.get(node)) else { continue };
+        for (i, &child) in children.iter().enumerate() {
+            if boxes[0][0][i] > boxes[0][1][i] {
+                continue;
+            }
+            // boxes are rounded outward: their highest corner is no lower than the facets'
+            let highest: f64 = (0..3).map(|k| n[k] * f64::from(boxes[k][usize::from(n[k] > 0.0)][i])).sum();
+            if highest <= height {
+                continue;
+            }
+            if child & LEAF == 0 {
+                if let Some(slot) = stack.get_mut(top) {
+                    *slot = child;
+                    top += 1;
+                }
+            } else if leaf_rises(bvh, child, normal, height) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+fn leaf_rises(bvh: &Bvh<'_>, leaf: u32, normal: Vec3, height: f64) -> bool {
+    let first = (leaf & !(LEAF | PAIR)) as usize;
+    let packets = first..first + 1 + usize::from(leaf & PAIR != 0);
+    bvh.packets.get(packets).unwrap_or(&[]).iter().any(|packet| {
+        packet[..3].iter().any(|[x, y, z]| {
+            // lanes without a facet are NaN and compare false
+            x.iter().zip(y).zip(z).any(|((&x, &y), &z)| Vec3::new(x, y, z).dot(normal) > height)
+        })
+    })
+}

@@ -1,0 +1,377 @@
+//! The kernel's stages from a mesh to its image in memory made beforehand, each cut into as many ranges as wanted.
+//!
+//! Nothing in [`run`] allocates, and each stage is given exactly the bytes that it asks for.
+#![allow(dead_code)]
+
+use blik_kernel::Error;
+use blik_kernel::beam::{self, BeamSettings};
+use blik_kernel::bvh::Bvh;
+use blik_kernel::camera::{Camera, CameraInput};
+use blik_kernel::chain::{ChainSettings, Solved};
+use blik_kernel::coupling::rows::{self, RowSettings};
+use blik_kernel::coupling::{Block, Coupling};
+use blik_kernel::element::Elements;
+use blik_kernel::image::{self, Tally, Target};
+use blik_kernel::light::{self, Light, Shape};
+use blik_kernel::radiosity::{System, bound, sweeps};
+use blik_kernel::scene::{MAX_BANDS, Scene, SceneInput};
+use blik_kernel::signature::{self, Sums, View};
+use blik_kernel::simd::Isa;
+use blik_kernel::sky::{Sky, SkyInput};
+use blik_kernel::subdivide;
+use blik_kernel::sun::{Sun, SunInput};
+use std::ops::Range;
+
+/// How a run is carried out; what it computes does not depend on it, but for the tolerance.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    /// Ranges that each stage is cut into, 1 to 8, carried out last to first.
+    pub parts: usize,
+    pub isa: Isa,
+    /// Builds the tree with obvhs instead of the kernel's own builder.
+    pub obvhs: bool,
+    pub tolerance: f64,
+}
+
+/// What was counted, besides the results in the workspace.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counts {
+    pub unknowns: usize,
+    pub visibility: u64,
+    pub sun: u64,
+    pub beams: u64,
+    pub records: usize,
+    pub sweeps: u32,
+    pub image: Tally,
+    pub signature_rays: u64,
+    pub projected_area: f64,
+    pub intensity: [f64; 4],
+}
+
+/// Most ranges of a stage.
+const PARTS: usize = 8;
+const CELLS: usize = 32;
+
+/// All memory of a run.
+pub struct Workspace {
+    scene: Vec<u8>,
+    bvh: Vec<u8>,
+    elements: Vec<u8>,
+    blocks: Vec<Vec<u8>>,
+    beams: Vec<Vec<u8>>,
+    unevenness: Vec<f64>,
+    divisions: Vec<u32>,
+    pub tables: Tables,
+    pub view: Outputs,
+}
+
+/// What light and solution write.
+pub struct Tables {
+    direct: Vec<f64>,
+    next: Vec<f64>,
+    noise: Vec<f32>,
+    /// Mean of cos V of the sun for each unknown.
+    pub sun: Vec<f64>,
+    /// Diffuse radiance of each unknown, each band.
+    pub radiance: Vec<f64>,
+    /// Mean and gradients of each unknown's irradiance, each band.
+    pub irradiance: Vec<f64>,
+}
+
+/// What a view writes.
+pub struct Outputs {
+    scratch: Vec<u8>,
+    sums: Vec<Sums>,
+    pub pixels: Vec<f32>,
+    pub terms: [Vec<f32>; 3],
+}
+
+impl Workspace {
+    /// Memory for `facets` facets cut into up to `unknowns` unknowns, `block` bytes of coupling a part.
+    pub fn new(facets: usize, unknowns: usize, bands: usize, pixels: usize, block: usize) -> Workspace {
+        let image = vec![f32::NAN; pixels * bands];
+        Workspace {
+            scene: vec![0xa5; facets * 512 + 8192],
+            bvh: vec![0xa5; Bvh::bytes(facets).unwrap()],
+            elements: vec![0xa5; 4 * (unknowns + 4 * facets) + 1024],
+            blocks: vec![vec![0xa5; block]; PARTS],
+            beams: vec![vec![0xa5; block]; PARTS],
+            unevenness: vec![f64::NAN; facets],
+            divisions: vec![0; facets],
+            tables: Tables {
+                direct: vec![f64::NAN; 3 * bands * unknowns],
+                next: vec![f64::NAN; bands * unknowns],
+                // this part of the estimate is not compared
+                noise: vec![0.0; unknowns],
+                sun: vec![f64::NAN; unknowns],
+                radiance: vec![f64::NAN; bands * unknowns],
+                irradiance: vec![f64::NAN; 3 * bands * unknowns],
+            },
+            view: Outputs {
+                scratch: vec![0xa5; 1 << 20],
+                sums: vec![Sums::ZERO; CELLS],
+                pixels: image.clone(),
+                terms: [image.clone(), image.clone(), image],
+            },
+        }
+    }
+
+    /// The bits of pixels and components.
+    pub fn pixel_bits(&self) -> Vec<u32> {
+        self.view.pixels.iter().chain(self.view.terms.iter().flatten()).map(|p| p.to_bits()).collect()
+    }
+
+    /// The bits of the first `unknowns` unknowns' irradiances, radiances and sun.
+    pub fn table_bits(&self, unknowns: usize, bands: usize) -> Vec<u64> {
+        let Tables { irradiance, radiance, sun, .. } = &self.tables;
+        let parts = [&irradiance[..3 * bands * unknowns], &radiance[..bands * unknowns], &sun[..unknowns]];
+        parts.iter().flat_map(|p| p.iter()).map(|x| x.to_bits()).collect()
+    }
+}
+
+/// Calls `work` for each of `parts` ranges of `rows` rows, last to first, with its part of `out` (`stride` values a
+/// row).
+fn split<T>(
+    parts: usize,
+    rows: usize,
+    stride: usize,
+    mut out: &mut [T],
+    mut work: impl FnMut(Range<usize>, &mut [T]) -> Result<(), Error>,
+) -> Result<(), Error> {
+    for part in (0..parts).rev() {
+        let range = part * rows / parts..(part + 1) * rows / parts;
+        let (before, own) = out.split_at_mut(range.start * stride);
+        work(range, own)?;
+        out = before;
+    }
+    Ok(())
+}
+
+/// Fills one block per range and opens them; ranges must fit into their blocks.
+fn fill_blocks<'m>(
+    parts: usize,
+    count: usize,
+    memory: &'m mut [Vec<u8>],
+    mut fill: impl FnMut(Range<usize>, &mut [u8]) -> Result<usize, Error>,
+) -> Result<[Block<'m>; PARTS], Error> {
+    split(parts, parts, 1, &mut memory[..parts], |part, block| {
+        let range = part.start * count / parts..(part.start + 1) * count / parts;
+        let wanted = range.len();
+        assert_eq!(fill(range, &mut block[0])?, wanted, "the blocks of the workspace are large enough");
+        Ok(())
+    })?;
+    let memory = &*memory;
+    let mut blocks = [Block::open(&memory[0])?; PARTS];
+    for (block, memory) in blocks.iter_mut().zip(&memory[..parts]) {
+        *block = Block::open(memory)?;
+    }
+    Ok(blocks)
+}
+
+/// From the mesh to image and signature; results are left in the workspace.
+pub fn run(
+    work: &mut Workspace,
+    input: &SceneInput<'_>,
+    sky: Option<&SkyInput<'_>>,
+    sun: Option<&SunInput<'_>>,
+    camera: &CameraInput,
+    plan: &Plan,
+) -> Result<Counts, Error> {
+    let mut counts = Counts::default();
+    let parts = plan.parts;
+    let bytes = Scene::bytes(input)?;
+    let scene = Scene::new(input, &mut work.scene[..bytes])?;
+    let bytes = Bvh::bytes(scene.facets())?;
+    let build = if plan.obvhs { Bvh::build_obvhs } else { Bvh::build };
+    let bvh = build(scene.corners(), scene.areas(), plan.isa, &mut work.bvh[..bytes])?;
+
+    split(parts, scene.facets(), 1, &mut work.unevenness, |range, out| {
+        counts.visibility += subdivide::probe(&scene, &bvh, range, out)?;
+        Ok(())
+    })?;
+    subdivide::divisions(&scene, &work.unevenness, plan.tolerance, &mut work.divisions)?;
+    let bytes = Elements::bytes(&work.divisions)?;
+    let elements = Elements::new(&scene, &work.divisions, &mut work.elements[..bytes])?;
+    counts.unknowns = elements.unknowns();
+
+    let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
+    let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
+        rows::fill(&scene, &bvh, &elements, &settings, range, memory)
+    })?;
+    let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
+    for (_, row) in coupling.rows(0..counts.unknowns) {
+        counts.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
+        counts.records += row.targets.len() + row.escapes.len();
+    }
+
+    let light = Light {
+        sky: sky.map(|s| Sky::new(s, scene.bands())).transpose()?,
+        sun: sun.map(|s| Sun::new(s, scene.bands())).transpose()?,
+    };
+    let shape = Shape { levels: 1, bands: scene.bands() };
+    let mut reference = [0.0; MAX_BANDS];
+    light.reference_radiance(&scene, &mut reference[..shape.bands]);
+    let reference = &reference[..shape.bands];
+    let stage = Stage {
+        scene: &scene,
+        bvh: &bvh,
+        elements: &elements,
+        coupling: &coupling,
+        light: &light,
+        shape,
+        reference,
+        plan,
+    };
+    stage.shine(&mut work.tables, &mut work.beams, &mut counts)?;
+    let brightest = stage.solve(&mut work.tables, &mut counts)?;
+    stage.view(&work.tables, brightest, camera, &mut work.view, &mut counts)?;
+    Ok(counts)
+}
+
+/// What the later stages share.
+struct Stage<'a> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    elements: &'a Elements<'a>,
+    coupling: &'a Coupling<'a>,
+    light: &'a Light<'a>,
+    shape: Shape,
+    reference: &'a [f64],
+    plan: &'a Plan,
+}
+
+impl Stage<'_> {
+    /// Direct light.
+    fn shine(&self, tables: &mut Tables, beams: &mut [Vec<u8>], counts: &mut Counts) -> Result<(), Error> {
+        let (parts, stride, tolerance) = (self.plan.parts, self.shape.stride(), self.plan.tolerance);
+        let (scene, bvh, elements) = (self.scene, self.bvh, self.elements);
+        let direct = &mut tables.direct[..counts.unknowns * stride];
+        direct.fill(0.0);
+        if let Some(sky) = &self.light.sky {
+            split(parts, counts.unknowns, stride, direct, |range, out| {
+                light::sky_rows(scene, elements, self.coupling, sky, 0.05 * tolerance, range, self.shape, out)
+            })?;
+        }
+        let lit = &mut tables.sun[..counts.unknowns];
+        lit.fill(0.0);
+        let Some(sun) = &self.light.sun else { return Ok(()) };
+        split(parts, counts.unknowns, 1, lit, |range, out| {
+            counts.sun += light::sun_rows(scene, bvh, elements, sun, range, out)?;
+            Ok(())
+        })?;
+        let settings =
+            BeamSettings::new(scene, sun, (500.0 / tolerance).clamp(65536.0, 1e8), 1e-3 * tolerance, 1000);
+        let mirrors = scene.facets() * scene.sides();
+        let blocks = fill_blocks(parts, mirrors, beams, |range, memory| {
+            beam::fill(scene, bvh, elements, sun, &settings, range, memory)
+        })?;
+        let thrown = Coupling::new(&blocks[..parts], mirrors)?;
+        beam::add(&thrown, sun, self.shape, direct);
+        counts.beams =
+            thrown.rows(0..mirrors).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum();
+        Ok(())
+    }
+
+    /// Radiances and irradiances; returns the largest radiance that a ray can see over the reference.
+    fn solve(&self, tables: &mut Tables, counts: &mut Counts) -> Result<f64, Error> {
+        let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
+        let stride = self.shape.stride();
+        let system = System {
+            scene: self.scene,
+            elements: self.elements,
+            coupling: self.coupling,
+            light: self.light,
+            direct: &tables.direct[..unknowns * stride],
+            sun: &tables.sun[..unknowns],
+            shape: self.shape,
+        };
+        let mut from = &mut tables.radiance[..unknowns * bands];
+        let mut to = &mut tables.next[..unknowns * bands];
+        split(parts, unknowns, bands, from, |range, out| {
+            system.start(range, out);
+            Ok(())
+        })?;
+        let q = system.contraction(0..unknowns);
+        let goal = 1e-3 * self.plan.tolerance;
+        let most = sweeps(q, goal) + 200;
+        let mut error = f64::INFINITY;
+        while error > goal && counts.sweeps < most {
+            let mut change: f64 = 0.0;
+            split(parts, unknowns, bands, to, |range, out| {
+                change = change.max(system.sweep(range, from, out, self.reference));
+                Ok(())
+            })?;
+            std::mem::swap(&mut from, &mut to);
+            counts.sweeps += 1;
+            error = bound(change, q);
+        }
+        to.copy_from_slice(from);
+        split(parts, unknowns, stride, &mut tables.irradiance[..unknowns * stride], |range, out| {
+            system.gather(range, 0, |_| from, out)
+        })?;
+        Ok(self.brightest(from))
+    }
+
+    fn brightest(&self, radiance: &[f64]) -> f64 {
+        let bands = self.shape.bands;
+        let mut largest = [0.0; MAX_BANDS];
+        self.light.largest_radiance(&mut largest[..bands]);
+        if let Some(sun) = &self.light.sun {
+            (0..bands).for_each(|b| largest[b] = f64::max(largest[b], sun.disc_radiance(b)));
+        }
+        for values in radiance.chunks_exact(bands) {
+            largest.iter_mut().zip(values).for_each(|(l, &v)| *l = l.max(v));
+        }
+        let relative = largest.iter().zip(self.reference).filter(|(_, r)| **r > 0.0);
+        relative.map(|(l, r)| l / r).fold(0.0, f64::max)
+    }
+
+    /// Image and signature.
+    fn view(
+        &self,
+        tables: &Tables,
+        brightest: f64,
+        camera: &CameraInput,
+        out: &mut Outputs,
+        counts: &mut Counts,
+    ) -> Result<(), Error> {
+        let (parts, bands, tolerance) = (self.plan.parts, self.shape.bands, self.plan.tolerance);
+        let solved = Solved {
+            scene: self.scene,
+            bvh: self.bvh,
+            elements: self.elements,
+            light: self.light,
+            irradiance: &tables.irradiance[..counts.unknowns * self.shape.stride()],
+            shape: self.shape,
+            noise: &tables.noise[..counts.unknowns],
+            reference: self.reference,
+            brightest,
+            settings: ChainSettings { cutoff: 0.05 * tolerance, max_bounces: None, tolerance },
+        };
+        let camera = Camera::new(camera, self.scene)?;
+        let bytes = image::scratch_bytes(&camera, bands)?;
+        let scratch = &mut out.scratch[..bytes];
+        let stride = camera.columns() * bands;
+        let [first, second, third] = &mut out.terms;
+        let mut rest = [&mut out.pixels[..], first, second, third];
+        for part in (0..parts).rev() {
+            let range = part * camera.rows() / parts..(part + 1) * camera.rows() / parts;
+            let [image, a, b, c] = rest.map(|all| {
+                let (before, own) = all.split_at_mut(range.start * stride);
+                (before, own)
+            });
+            rest = [image.0, a.0, b.0, c.0];
+            let mut target = Target { image: image.1, components: [a.1, b.1, c.1] };
+            counts.image.add(&image::rows(&solved, &camera, range, &mut target, scratch)?);
+        }
+        let view = View::new(&solved, camera.forward(), out.sums.len())?;
+        split(parts, view.rows(), 1, &mut out.sums, |range, out| {
+            signature::rows(&solved, &view, range, out)
+        })?;
+        let mut sums = Sums::ZERO;
+        out.sums.iter().for_each(|row| sums.add(row));
+        (counts.projected_area, counts.signature_rays) = (sums.area, sums.rays);
+        counts.intensity.copy_from_slice(&sums.intensity[..4]);
+        Ok(())
+    }
+}
