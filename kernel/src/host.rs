@@ -226,8 +226,8 @@ impl Host {
             None => light.reference_radiance(scene, &mut reference),
         }
         let coupling = geometry.coupling()?;
-        // orders of reflection are kept apart only where their number is bounded, and small
-        let levels = geometry.settings.max_bounces.filter(|&b| b <= 32).map_or(1, |b| b as usize + 1);
+        // orders of reflection are kept apart only where their number is bounded, and small; one level counts all
+        let levels = geometry.settings.max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);
         let shape = Shape { levels, bands };
         let unknowns = elements.unknowns();
         let mut direct = std::vec![0.0; unknowns * shape.stride()];
@@ -533,7 +533,8 @@ impl Lit<'_> {
     /// radiance is emission + rho_d irradiance/pi. Degenerate facets: zeros.
     pub fn facets(&self, mut each: impl FnMut(usize, usize, f64, &[f64], &[f64])) {
         let (scene, elements) = (&self.geometry.scene, &self.geometry.elements);
-        let (bands, level) = (self.shape.bands, self.shape.levels - 1);
+        let (bands, last) = (self.shape.bands, self.shape.levels - 1);
+        let level = self.geometry.settings.max_bounces.map_or(last, |most| last.min(most as usize));
         let (mut irradiance, mut radiance) = (std::vec![0.0; bands], std::vec![0.0; bands]);
         for facet in 0..scene.facets() {
             for side in 0..scene.sides() {

@@ -238,7 +238,15 @@ impl Tracer<'_, '_> {
 
 /// Rays that a row needs when `blocked` of its first `rays` met something (one more may well have): the error
 /// goes with the square root of the variance, (4 p (1 - p))^(1/2) of the largest, and with n^-2/3.
+///
+/// Where only few rays escaped, the opening is too small to be judged and the row takes all its rays: rows that
+/// happened to see none of it would stop early, openings came out too small on average, and a cavity magnifies
+/// that by 1/(1 - q).
 fn enough(most: u32, rays: u32, blocked: u32) -> u32 {
+    const FEW: u32 = 16;
+    if rays - blocked < FEW {
+        return most;
+    }
     let p = (f64::from(blocked) + 1.0) / (f64::from(rays) + 1.0);
     let wanted = pow((4.0 * p * (1.0 - p)).max(0.0), 0.75) * f64::from(most);
     let mut goal = rays;
