@@ -43,7 +43,8 @@ plain_struct! {
         pub unused: u32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
-        /// Difference between the two halves of the row's rays, as a share of the hemisphere.
+        /// Difference between the two halves of the row's rays, as a share of the hemisphere: in what is blocked, or in
+        /// which facets block it.
         pub spread: f64,
     }
 }

@@ -12,9 +12,9 @@ use super::{BLOCKED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::{Elements, Local};
 use crate::error::Error;
-use crate::math::{Vec3, frame, pow};
+use crate::math::{Vec3, fabs, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
-use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::qmc::{Sequence, cosine_direction, hash, hash2, triangle};
 use crate::scene::Scene;
 use core::ops::Range;
 
@@ -113,6 +113,9 @@ struct Tally {
     chain_rays: u32,
     blocked: u32,
     blocked_first_half: u32,
+    /// Sum over the first hits of a number in [0, 1) that each facet has: tells rows apart that are all blocked.
+    marks: f64,
+    marks_first_half: f64,
     lost: f64,
 }
 
@@ -146,6 +149,7 @@ impl Tracer<'_, '_> {
         while tally.rays < goal {
             if 2 * tally.rays == goal {
                 tally.blocked_first_half = tally.blocked;
+                tally.marks_first_half = tally.marks;
             }
             self.ray(&start, &mut tally)?;
             tally.rays += 1;
@@ -155,6 +159,7 @@ impl Tracer<'_, '_> {
         }
         let share = 1.0 / f64::from(tally.rays);
         let halves = f64::from(tally.blocked) - 2.0 * f64::from(tally.blocked_first_half);
+        let marks = tally.marks - 2.0 * tally.marks_first_half;
         self.sink.end_row(
             share,
             Row {
@@ -162,7 +167,7 @@ impl Tracer<'_, '_> {
                 rays: tally.rays,
                 chain_rays: tally.chain_rays,
                 lost: tally.lost * share,
-                spread: crate::math::fabs(halves) * share,
+                spread: fabs(halves).max(fabs(marks)) * share,
                 ..Row::default()
             },
         );
@@ -199,6 +204,7 @@ impl Tracer<'_, '_> {
             };
             if word == EMPTY {
                 tally.blocked += 1;
+                tally.marks += mark(hit.facet);
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, local))?;
             }
             let Some(surface) = Surface::of_hit(self.scene, &hit) else { return Some(()) };
@@ -236,24 +242,24 @@ impl Tracer<'_, '_> {
     }
 }
 
-/// Rays that a row needs when `blocked` of its first `rays` met something (one more may well have): the error
-/// goes with the square root of the variance, (4 p (1 - p))^(1/2) of the largest, and with n^-2/3.
-///
-/// Where only few rays escaped, the opening is too small to be judged and the row takes all its rays: rows that
-/// happened to see none of it would stop early, openings came out too small on average, and a cavity magnifies
-/// that by 1/(1 - q).
+/// Rays that a row needs when `blocked` of its first `rays` met something: the error goes with the square root of
+/// the variance and with n^-2/3. The variance of the blocked share p is p (1 - p); where half the rays or more meet
+/// facets, it is which facets they meet that counts, and the variance is taken at its largest, 1/4.
 fn enough(most: u32, rays: u32, blocked: u32) -> u32 {
-    const FEW: u32 = 16;
-    if rays - blocked < FEW {
-        return most;
-    }
-    let p = (f64::from(blocked) + 1.0) / (f64::from(rays) + 1.0);
-    let wanted = pow((4.0 * p * (1.0 - p)).max(0.0), 0.75) * f64::from(most);
+    // one ray more may have met something
+    let p = ((f64::from(blocked) + 1.0) / (f64::from(rays) + 1.0)).min(0.5);
+    let wanted = pow(4.0 * p * (1.0 - p), 0.75) * f64::from(most);
     let mut goal = rays;
     while f64::from(goal) < wanted && goal < most {
         goal *= 2;
     }
     goal
+}
+
+/// A number in [0, 1) that each facet has.
+#[inline(always)]
+fn mark(facet: u32) -> f64 {
+    f64::from(hash(facet)) * (1.0 / 4_294_967_296.0)
 }
 
 #[inline(always)]
