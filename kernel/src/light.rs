@@ -26,7 +26,7 @@ pub struct Light<'a> {
 
 impl Light<'_> {
     /// Reference radiance of each band: max(E_up, E_down)/pi + E_sun/pi with the unobstructed sky irradiances
-    /// of planes that face +-up; without sky and sun the largest emission.
+    /// of planes that face +-up; in a band without light from either, the largest emission.
     pub fn reference_radiance(&self, scene: &Scene<'_>, out: &mut [f64]) {
         out.fill(0.0);
         if let Some(sky) = &self.sky {
@@ -39,8 +39,8 @@ impl Light<'_> {
         if let Some(sun) = &self.sun {
             out.iter_mut().enumerate().for_each(|(band, o)| *o += sun.irradiance(band) / PI);
         }
-        if self.sky.is_none() && self.sun.is_none() {
-            out.iter_mut().enumerate().for_each(|(band, o)| *o = scene.largest_emission(band));
+        for (band, o) in out.iter_mut().enumerate().filter(|(_, o)| **o == 0.0) {
+            *o = scene.largest_emission(band);
         }
     }
 

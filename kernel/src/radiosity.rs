@@ -3,7 +3,7 @@
 //! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
 //! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep.
 
-use crate::coupling::Coupling;
+use crate::coupling::{BLOCKED, Coupling};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::light::{Light, Shape};
@@ -102,10 +102,13 @@ impl System<'_> {
             return Err(Error::Length { what: "irradiance table", expected, given: out.len() });
         }
         let part = self.shape.at(0, level);
+        let mut sky = [0.0; MAX_BANDS];
+        self.light.largest_radiance(&mut sky[..bands]);
         for ((unknown, row), values) in self.coupling.rows(range).zip(out.chunks_exact_mut(stride)) {
             let values = &mut values[part.clone()];
             values.copy_from_slice(&self.direct[self.shape.at(unknown, level)]);
-            let mut square = [0.0; MAX_BANDS];
+            let blocked: f64 = row.escapes.iter().filter(|r| r.word() == BLOCKED).map(|r| r.weight).sum();
+            let mut square = sky.map(|l| (PI * l) * (PI * l) * blocked);
             for record in row.targets {
                 let depth = row.depth(record);
                 if !self.shape.counts(depth, level) {

@@ -14,6 +14,9 @@ pub const MAX_BANDS: usize = 64;
 /// "No vertex normal" in [`SceneInput::facet_normals`].
 pub const NO_NORMAL: u32 = u32::MAX;
 
+/// The most rays that a material may ask for at the first hit of its lobe.
+pub const MOST_GLOSS_RAYS: u32 = 65_536;
+
 /// The widest lobe's axis ratio is 1; from this one on a glossy material is an ideal mirror.
 pub const MIRROR_AXIS_RATIO: f64 = 1e4;
 
@@ -22,7 +25,7 @@ pub const MIRROR_AXIS_RATIO: f64 = 1e4;
 pub struct Gloss {
     /// Long over short axis of the lobe, >= 1.
     pub axis_ratio: f64,
-    /// Rays at the first hit; `None`: by tolerance.
+    /// Rays at the first hit, 1 to [`MOST_GLOSS_RAYS`]; `None`: by tolerance.
     pub rays: Option<u32>,
 }
 
@@ -385,13 +388,9 @@ fn check_materials(input: &SceneInput<'_>) -> Result<(), Error> {
                 let (field, value) = (Field::AxisRatio, gloss.axis_ratio);
                 return Err(Error::MaterialRange { material: index, band: 0, field, value });
             }
-            if gloss.rays == Some(0) {
-                return Err(Error::MaterialRange {
-                    material: index,
-                    band: 0,
-                    field: Field::GlossRays,
-                    value: 0.0,
-                });
+            if let Some(rays) = gloss.rays.filter(|n| !(1..=MOST_GLOSS_RAYS).contains(n)) {
+                let (field, value) = (Field::GlossRays, f64::from(rays));
+                return Err(Error::MaterialRange { material: index, band: 0, field, value });
             }
         }
     }

@@ -113,7 +113,7 @@ fn unevenness(blocked: &[f64; BINS]) -> f64 {
 /// A jump leaves an error in the elements that it crosses, a share 1/S of them: the facet's part of the image's
 /// mean square error is a V rho^2/S with its share `a` of the area. The least number of elements for a given
 /// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what 1 + 2e-3/tolerance
-/// times as many elements as there are facets reach.
+/// times as many elements as there are facets (and a thousand, for coarse meshes) reach.
 pub fn divisions(
     scene: &Scene<'_>,
     unevenness: &[f64],
@@ -132,7 +132,7 @@ pub fn divisions(
     };
     let goal = 0.25 * tolerance * tolerance;
     let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;
-    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + 256.0;
+    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + 1024.0 * (2e-3 / tolerance).min(1.0);
     loop {
         let mut elements = 0.0;
         for (facet, s) in out.iter_mut().enumerate() {

@@ -218,7 +218,14 @@ impl Tracer<'_, '_> {
                 tally.lost += weight * self.sink.words.largest(word);
                 return Some(());
             }
-            let next = self.sink.words.push(word, mirror.class, self.scene)?;
+            let next = match self.sink.spell(word, mirror.class, self.scene) {
+                Ok(next) => next,
+                Err(true) => {
+                    tally.lost += weight * self.sink.words.largest(word);
+                    return Some(());
+                }
+                Err(false) => return None,
+            };
             if self.sink.words.largest(next) * weight < self.settings.cutoff {
                 tally.lost += weight * self.sink.words.largest(next);
                 return Some(());

@@ -5,6 +5,7 @@ use super::{BLOCKED, Head, Record, Row};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::element::gradient;
 use crate::error::Error;
+use crate::scene::Scene;
 use core::cmp::Ordering;
 use core::ops::Range;
 
@@ -81,6 +82,14 @@ impl<'m> Sink<'m> {
         *self.records.get_mut(self.used)? = record;
         self.used += 1;
         Some(())
+    }
+
+    /// The word with one more letter; `Err(true)` where the chain must end, since one row alone has used up all
+    /// words; `Err(false)` where more memory or an empty block helps.
+    #[inline]
+    pub fn spell(&mut self, word: u16, class: u32, scene: &Scene<'_>) -> Result<u16, bool> {
+        let alone = self.done == 0;
+        self.words.push(word, class, scene).ok_or_else(|| alone && self.words.is_exhausted())
     }
 
     /// Drops the present row.

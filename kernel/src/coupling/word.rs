@@ -54,6 +54,11 @@ impl<'m> Words<'m> {
         self.used
     }
 
+    /// True where the table has all the words that a record can name: more memory would not help.
+    pub fn is_exhausted(&self) -> bool {
+        self.used >= self.words.len() && self.words.len() >= u16::MAX as usize
+    }
+
     /// The word itself.
     #[inline(always)]
     pub fn get(&self, word: u16) -> Word {
