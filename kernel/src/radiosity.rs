@@ -151,7 +151,7 @@ impl System<'_> {
 
 /// Scales gradients down by the part of their square that noise explains (James and Stein's estimate): the
 /// mean square of a linear function with these gradients over the element is `signal`; independent rays would
-/// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net about a twentieth of that.
+/// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net about a quarter of that.
 fn damp(values: &mut [f64], square: &[f64], rays: u32, bands: usize) {
     if rays == 0 {
         return;
@@ -159,7 +159,7 @@ fn damp(values: &mut [f64], square: &[f64], rays: u32, bands: usize) {
     for (band, &square) in square.iter().enumerate().take(bands) {
         let (a, b) = (values[bands + band], values[2 * bands + band]);
         let signal = (a * a + b * b - a * b) / 18.0;
-        let noise = 0.1 * square / f64::from(rays);
+        let noise = 0.5 * square / f64::from(rays);
         let keep = if signal > noise { 1.0 - noise / signal } else { 0.0 };
         values[bands + band] = a * keep;
         values[2 * bands + band] = b * keep;
