@@ -23,7 +23,8 @@
 //! | image | [`image`] ([`camera`]) | view | rays → pixels |
 //! | signature | [`signature`] | view | rays → radiant intensity, projected area, contrast |
 //!
-//! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Beside them: [`form_factor`] and [`quadrature`],
+//! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Over them: [`policy`], what follows from the
+//! tolerance. Beside them: [`form_factor`] and [`quadrature`],
 //! exact form factors between points and polygons.
 //!
 //! # Where the paper's equations are
@@ -74,6 +75,7 @@ pub mod light;
 pub mod lobe;
 pub mod math;
 pub mod mirror;
+pub mod policy;
 pub mod qmc;
 pub mod quadrature;
 pub mod radiosity;
