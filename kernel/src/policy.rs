@@ -31,6 +31,11 @@ pub fn unmerged(rows: &RowSettings) -> usize {
     4 * rows.rays as usize
 }
 
+/// Probing rays of a bin: all bins together have half as many as a row of the coupling.
+pub fn probing(rows: &RowSettings) -> u32 {
+    (rows.rays / 32).clamp(4, crate::subdivide::MOST_RAYS)
+}
+
 /// Relative error of the sky's irradiance on a plane.
 pub fn sky_accuracy(tolerance: f64) -> f64 {
     (0.05 * tolerance).max(1e-9)
