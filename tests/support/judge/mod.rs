@@ -8,7 +8,8 @@
 //! other, what a point sun throws by two of them and more is left out. Of a disc it is found by rays that meet it.
 //!
 //! Apart from the twin's support modules: a test takes it with `#[path = "support/judge/mod.rs"] mod judge;`.
-#![allow(dead_code)]
+// Each binary uses a part.
+#![allow(dead_code, unused_imports)]
 
 mod sampler;
 mod score;
