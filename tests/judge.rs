@@ -6,8 +6,8 @@ mod support;
 
 use blik_kernel::arena::Memory;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
-use glam::{DVec3, dvec3};
-use judge::{Judge, score};
+use glam::dvec3;
+use judge::{Judge, ray, score};
 use support::scenes::{self, Mesh};
 use support::twin::{self, Effort, Material, Model, Scene, Sky, Sun};
 
@@ -15,18 +15,6 @@ fn camera(eye: [f64; 3], target: [f64; 3], height: f64, pixels: usize) -> Camera
     let projection = Projection::Orthographic { height };
     let up = [0.0, 0.0, 1.0];
     CameraInput { projection, eye, target, up, columns: pixels, rows: pixels, sampling: Sampling::Centre }
-}
-
-/// The ray through a pixel's centre, as the scene file defines it.
-fn ray(camera: &CameraInput, pixel: usize) -> (DVec3, DVec3) {
-    let n = camera.columns as f64;
-    let (column, row) = ((pixel % camera.columns) as f64 + 0.5, (pixel / camera.columns) as f64 + 0.5);
-    let eye = DVec3::from(camera.eye);
-    let forward = (DVec3::from(camera.target) - eye).normalize();
-    let right = forward.cross(DVec3::Z).normalize();
-    let Projection::Orthographic { height } = camera.projection else { panic!("orthographic") };
-    let [x, y] = [column / n - 0.5, 0.5 - row / n].map(|c| c * height);
-    (eye + right * x + right.cross(forward) * y, forward)
 }
 
 /// Pixels and facets of judge and twin agree within their noise: neither single values nor all of them together are off.
@@ -43,9 +31,10 @@ fn agree(name: &str, scene: &Scene, camera: &CameraInput, rays: usize) {
         differences.push((mean - truth) / sigma);
     };
     for pixel in (0..halves.hit.len()).filter(|&p| halves.hit[p]) {
-        let (origin, direction) = ray(camera, pixel);
+        let [row, column] = [pixel / camera.columns, pixel % camera.columns].map(|k| k as f64 + 0.5);
+        let ray = ray(camera, column, row);
         let effort = Effort { seed: pixel as u64, threshold: 1e-5, randomisations: 16, ..Effort::rays(rays) };
-        let truth = twin::radiance(scene, origin, direction, effort);
+        let truth = twin::radiance(scene, ray.origin, ray.direction, effort);
         for band in 0..bands {
             let mine = [0, 1].map(|h| halves.values[h][pixel * bands + band]);
             note(mine, truth.mean[band], truth.standard_error[band]);

@@ -12,6 +12,7 @@
 //! * `--mrays N`: millions of rays after which a reference is good enough, by default 20
 //! * `--tolerance X`: another tolerance for Blik in all cases (references stay as they are)
 //! * `--dump FOLDER`: images of Blik and both halves as .npy
+//! * `--twin N`: N pixels of each case by the readable twin, too (slow; where pixels are single rays)
 //! * `--list`: names the cases and ends
 
 #[path = "../../../tests/support/judge/mod.rs"]
@@ -30,6 +31,7 @@ mod light;
 mod options;
 mod reference;
 mod shapes;
+mod verify;
 
 use case::{CASES, Case};
 use figures::{FIGURES_HEAD, Row, figures};
@@ -97,6 +99,11 @@ fn calibrate(options: &Options) -> Result<(), String> {
 /// A case's row; the inner error is Blik's.
 fn measure(case: &Case, options: &Options) -> Result<Result<Row, blik_kernel::Error>, String> {
     let reference = reference::of(case, options.goal, &options.references).map_err(|e| e.to_string())?;
+    if options.twin > 0
+        && let Some((difference, noise)) = verify::against_twin(case, &reference, options.twin)
+    {
+        eprintln!("case {}: judge and twin differ by {difference:.1e}, noise {noise:.1e}", case.index);
+    }
     let tolerance = options.tolerance.unwrap_or(case.tolerance);
     let outcome = match blik::run(case, tolerance) {
         Ok(outcome) => outcome,

@@ -20,6 +20,8 @@ pub struct Options {
     pub tolerance: Option<f64>,
     /// Where images go.
     pub dump: Option<PathBuf>,
+    /// Pixels of each case that the twin computes, too.
+    pub twin: usize,
     /// Only name the cases.
     pub list: bool,
 }
@@ -37,6 +39,7 @@ impl Options {
             goal: Goal { error: 0.15, rays: 20_000_000 },
             tolerance: None,
             dump: None,
+            twin: 0,
             list: false,
         };
         options.read().map_err(|e| e.to_string())?;
@@ -55,6 +58,7 @@ impl Options {
                 Long("mrays") => self.goal.rays = 1_000_000 * parser.value()?.parse::<u64>()?,
                 Long("tolerance") => self.tolerance = Some(parser.value()?.parse()?),
                 Long("dump") => self.dump = Some(parser.value()?.into()),
+                Long("twin") => self.twin = parser.value()?.parse()?,
                 Long("list") => self.list = true,
                 other => return Err(other.unexpected()),
             }

@@ -18,7 +18,7 @@ mod view;
 mod walk;
 
 pub use score::{Score, score};
-pub use view::Halves;
+pub use view::{Halves, ray};
 
 use crate::support::twin::{Material, Rng, Scene, Sky, Sun, cosine_direction};
 use blik_kernel::arena::Memory;
@@ -120,6 +120,11 @@ impl<'m> Judge<'m> {
         (0..self.bands)
             .map(|b| if dark { emission(b) } else { sides[0][b].max(sides[1][b]) + sun[b] })
             .collect()
+    }
+
+    /// Whether the sun is followed through mirrors of any number and order: they lie in a few planes.
+    pub fn follows_all_mirrors(&self) -> bool {
+        matches!(self.mirrors, Mirrors::Maps(_))
     }
 
     /// Mean irradiance (not divided by pi) on the sides `(facet, front)`, each from twice `samples` (at most 65,536)
