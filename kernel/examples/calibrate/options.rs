@@ -22,6 +22,8 @@ pub struct Options {
     pub dump: Option<PathBuf>,
     /// Pixels of each case that the twin computes, too.
     pub twin: usize,
+    /// Sort each case's error by what is difficult about its pixels.
+    pub causes: bool,
     /// Only name the cases.
     pub list: bool,
 }
@@ -40,6 +42,7 @@ impl Options {
             tolerance: None,
             dump: None,
             twin: 0,
+            causes: false,
             list: false,
         };
         options.read().map_err(|e| e.to_string())?;
@@ -59,6 +62,7 @@ impl Options {
                 Long("tolerance") => self.tolerance = Some(parser.value()?.parse()?),
                 Long("dump") => self.dump = Some(parser.value()?.into()),
                 Long("twin") => self.twin = parser.value()?.parse()?,
+                Long("causes") => self.causes = true,
                 Long("list") => self.list = true,
                 other => return Err(other.unexpected()),
             }

@@ -11,6 +11,7 @@
 // Each binary uses a part.
 #![allow(dead_code, unused_imports)]
 
+mod cause;
 mod sampler;
 mod score;
 mod sunlight;
