@@ -73,7 +73,7 @@ impl Options {
     /// Whether a case of this number belongs to the subset.
     pub fn takes(&self, index: usize) -> bool {
         // of kind k the cases start at another one, so that a subset has all kinds of light
-        (index / FAMILIES.len() + index % FAMILIES.len()) % self.every == 0
+        (index / FAMILIES.len() + index % FAMILIES.len()).is_multiple_of(self.every)
     }
 
     /// Whether the filter lets a case pass.
