@@ -69,16 +69,17 @@ fn a_mirror_throws_the_sun_once() {
 
 #[test]
 fn a_lobe_shows_the_sun_once() {
-    let (ratio, rho, e) = (3.0, 0.6, 1.0);
+    let (ratio, rho, e) = (1.5, 0.6, 1.0);
     let material = Material { gloss: Some(ratio), ..Material::new(0.0, rho) };
-    // seen from 30 degrees off the mirror direction of a sun of 2 degrees
-    let case = Case::new(scenes::tilted_square(0.0), &[material]).sun(SunOf::new([0.0, 0.0, 1.0], &[e], 2.0));
+    // a wide lobe seen from some 23 degrees off the mirror direction: several of its rays would meet a disc this large
+    let case =
+        Case::new(scenes::tilted_square(0.0), &[material]).sun(SunOf::new([0.0, 0.0, 1.0], &[e], 10.0));
     let camera = orthographic([2.0, 0.5, 12f64.sqrt()], [0.5, 0.5, 0.0], 0.2, 2);
     let eye = dvec3(1.5, 0.0, 12f64.sqrt()).normalize();
     let truth = rho * e * lobe(ratio, eye.z);
     for value in pixels(&case, &camera) {
-        // the lobe bends over the disc by some (2 degrees)^2 of its own width: 1 %
-        assert!((value / truth - 1.0).abs() < 0.02, "{value}, not {truth}");
+        // the lobe bends a little over the disc; the disc seen again would add as much again
+        assert!((value / truth - 1.0).abs() < 0.05, "{value}, not {truth}");
     }
 }
 
@@ -162,10 +163,11 @@ fn what_lies_below_the_horizon_hides_no_sky() {
 
 #[test]
 fn nearly_perfect_mirrors_keep_the_furnace() {
-    // a chain of 60 mirrors of 0.99 would lose 55 %: in a tall shaft chains are that long
+    // seen at 10 degrees over the rim of a shaft, the sky is some 65 mirrors of 0.99 away: they leave half of it
     let mesh = scenes::box_open(1.0, 1.0, 6.0, 2);
     let case = Case::new(mesh, &vec![Material::new(0.01, 0.99); 2]).sky(SkyOf::uniform(1));
-    let camera = perspective([0.5, 0.45, 7.0], [0.5, 0.52, 0.0], 8.0, 12);
+    let (sin, cos) = (PI / 18.0).sin_cos();
+    let camera = orthographic([1.0 - 5.0 * cos, 0.47, 5.93 + 5.0 * sin], [1.0, 0.53, 5.93], 0.06, 8);
     for value in pixels(&case, &camera) {
         // every path of light ends in a sky of 1; three tolerances for a single pixel
         assert!((value - 1.0).abs() < 3.0 * TOLERANCE, "{value}");
