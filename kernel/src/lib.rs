@@ -22,6 +22,7 @@
 //! | chain | [`chain`] | view | a ray → its radiance, the three terms of eq. (11) |
 //! | image | [`image`] ([`camera`]) | view | rays → pixels |
 //! | signature | [`signature`] | view | rays → radiant intensity, projected area, contrast |
+//! | plane model | [`plane`], all stages in two dimensions | | circles and polylines → image |
 //!
 //! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Beside them: [`form_factor`] and [`quadrature`],
 //! exact form factors between points and polygons.
@@ -74,6 +75,7 @@ pub mod light;
 pub mod lobe;
 pub mod math;
 pub mod mirror;
+pub mod plane;
 pub mod qmc;
 pub mod quadrature;
 pub mod radiosity;

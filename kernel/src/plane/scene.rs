@@ -1,0 +1,668 @@
+//! Circles and polylines, checked and cut into elements.
+
+use crate::arena::{Arena, Need, plain_struct};
+use crate::error::{Error, Field};
+use crate::math::{TAU, asin, atan2, cos, floor, sin};
+use crate::plane::lobe::PlaneLobe;
+use crate::plane::{Vec2, length};
+use crate::quadrature::Gauss;
+use crate::scene::MIRROR_AXIS_RATIO;
+
+/// How a lobe is replaced by rays where a chain meets it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RaySet {
+    /// As the paper prints it, eq. (18): the mirror ray and one at half of `spacing` (radians) to either side,
+    /// weighed as q at their angles; the sum of the three is rho_0, and rays below the surface are lost.
+    /// `renormalised`: the rays above the surface share A(theta) instead. Full tree.
+    Paper {
+        /// Full angle between the side rays, radians.
+        spacing: f64,
+        /// Share A(theta) among the rays above the surface.
+        renormalised: bool,
+    },
+    /// Gauss nodes in the visible lobe's energy: so many at the first lobe of a path, the second, and later.
+    Gauss([u32; 3]),
+    /// Midpoints of so many equal shares of the visible lobe's energy.
+    Equal([u32; 3]),
+    /// The visible lobe is split at the silhouettes seen from the point: exact for what escapes to a uniform
+    /// sky, and so many Gauss nodes in each part that meets a body. At the fourth lobe of a path and later,
+    /// Gauss nodes in the whole.
+    Split([u32; 3]),
+}
+
+impl RaySet {
+    /// The set whose error under a uniform sky stays below `tolerance` times the sky for the two-circle study
+    /// (measured: `tests/plane_gloss.rs`).
+    pub fn for_tolerance(tolerance: f64) -> RaySet {
+        match tolerance {
+            t if t >= 1e-2 => RaySet::Split([2, 1, 1]),
+            t if t >= 2e-3 => RaySet::Split([4, 2, 1]),
+            t if t >= 2e-4 => RaySet::Split([8, 4, 2]),
+            _ => RaySet::Split([16, 12, 8]),
+        }
+    }
+}
+
+/// A lobe in place of an ideal mirror.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneGloss {
+    /// Long over short axis, >= 1; 1e4 and above: an ideal mirror.
+    pub axis_ratio: f64,
+    /// The rays that stand for it.
+    pub rays: RaySet,
+}
+
+/// Reflectances of a surface; diffuse + specular <= 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneMaterial {
+    /// rho_d, 0 to 1.
+    pub diffuse: f64,
+    /// rho_s, or rho_0 of a lobe, 0 to 1.
+    pub specular: f64,
+    /// The lobe; `None`: an ideal mirror.
+    pub gloss: Option<PlaneGloss>,
+}
+
+/// One body. Bodies touch at most in corners and do not overlap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape<'a> {
+    /// Seen from outside.
+    Circle {
+        /// Centre.
+        centre: [f64; 2],
+        /// Radius, positive.
+        radius: f64,
+    },
+    /// Straight segments, whose fronts are on the right of their direction: counter-clockwise for a solid body,
+    /// clockwise for a cavity. Backs are black and opaque.
+    Polyline {
+        /// At least two; those that are closed: at least three, the first not repeated.
+        points: &'a [[f64; 2]],
+        /// The last point joins the first.
+        closed: bool,
+        /// The polyline stands for a smooth curve: mirror directions use normals interpolated between the
+        /// points, and diffuse radiance is interpolated across them.
+        smooth: bool,
+    },
+}
+
+/// A body as it enters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyInput<'a> {
+    /// Its shape.
+    pub shape: Shape<'a>,
+    /// Index of its material.
+    pub material: usize,
+    /// Elements of the circle, or of each segment, >= 1.
+    pub elements: u32,
+}
+
+/// What a scene is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlaneInput<'a> {
+    /// At least one.
+    pub bodies: &'a [BodyInput<'a>],
+    /// At least one.
+    pub materials: &'a [PlaneMaterial],
+}
+
+/// How the diffuse radiance varies between the unknowns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// One unknown an element, constant on it (the paper).
+    Constant,
+    /// One unknown an element, linear between the elements' centres.
+    Linear,
+    /// So many unknowns an element (1 to [`MAX_ORDER`]), the polynomial through its Gauss points.
+    Panels(u32),
+}
+
+/// Most Gauss points of an element.
+pub const MAX_ORDER: usize = 6;
+
+impl Basis {
+    /// Unknowns of an element.
+    pub fn order(self) -> u32 {
+        match self {
+            Basis::Constant | Basis::Linear => 1,
+            Basis::Panels(order) => order.clamp(1, MAX_ORDER as u32),
+        }
+    }
+}
+
+plain_struct! {
+    /// A circle, or one segment of a polyline, checked.
+    pub struct Primitive {
+        /// Centre, or start.
+        pub a: [f64; 2],
+        /// (radius, 0), or end.
+        pub b: [f64; 2],
+        /// Front normal of a segment.
+        pub normal: [f64; 2],
+        /// Normal at the start of a smooth segment.
+        pub start_normal: [f64; 2],
+        /// Normal at its end.
+        pub end_normal: [f64; 2],
+        /// 0: circle, 1: segment.
+        pub kind: u32,
+        /// First element.
+        pub first: u32,
+        /// Elements.
+        pub elements: u32,
+        /// Material.
+        pub material: u32,
+        /// Body.
+        pub body: u32,
+        /// 1: interpolated normals.
+        pub smooth: u32,
+    }
+}
+
+plain_struct! {
+    /// Where a body is.
+    pub struct Body {
+        /// Centre of a circle around it.
+        pub centre: [f64; 2],
+        /// Its radius.
+        pub radius: f64,
+        /// First primitive.
+        pub first: u32,
+        /// Primitives.
+        pub count: u32,
+        /// 1 where backs are never seen.
+        pub closed: u32,
+        /// Material.
+        pub material: u32,
+    }
+}
+
+plain_struct! {
+    /// A material, checked.
+    pub struct Material {
+        /// rho_d.
+        pub diffuse: f64,
+        /// rho_s or rho_0.
+        pub specular: f64,
+        /// The lobe, where `set` is not 0.
+        pub lobe: PlaneLobe,
+        /// Spacing of the paper's rays.
+        pub spacing: f64,
+        /// Which ray set: 0 an ideal mirror, 1 and 2 the paper's, 3 Gauss, 4 equal, 5 split.
+        pub set: u32,
+        /// Its counts.
+        pub counts: [u32; 3],
+    }
+}
+
+impl Material {
+    fn new(input: &PlaneMaterial) -> Result<Material, Error> {
+        let kept = Material { diffuse: input.diffuse, specular: input.specular, ..Material::default() };
+        let Some(gloss) = input.gloss.filter(|g| g.axis_ratio < MIRROR_AXIS_RATIO && input.specular > 0.0)
+        else {
+            return Ok(kept);
+        };
+        let kept = Material { lobe: PlaneLobe::new(gloss.axis_ratio)?, ..kept };
+        Ok(match gloss.rays {
+            RaySet::Paper { spacing, renormalised } => {
+                Material { set: if renormalised { 2 } else { 1 }, spacing, ..kept }
+            }
+            RaySet::Gauss(counts) => Material { set: 3, counts, ..kept },
+            RaySet::Equal(counts) => Material { set: 4, counts, ..kept },
+            RaySet::Split(counts) => Material { set: 5, counts, ..kept },
+        })
+    }
+
+    #[inline(always)]
+    fn rays(&self) -> Option<RaySet> {
+        match self.set {
+            1 | 2 => Some(RaySet::Paper { spacing: self.spacing, renormalised: self.set == 2 }),
+            3 => Some(RaySet::Gauss(self.counts)),
+            4 => Some(RaySet::Equal(self.counts)),
+            5 => Some(RaySet::Split(self.counts)),
+            _ => None,
+        }
+    }
+}
+
+/// A point on a primitive.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// The point.
+    pub point: Vec2,
+    /// Unit normal of the surface there.
+    pub normal: Vec2,
+}
+
+/// A checked scene.
+#[derive(Clone, Copy, Debug)]
+pub struct PlaneScene<'m> {
+    primitives: &'m [Primitive],
+    bodies: &'m [Body],
+    materials: &'m [Material],
+    basis: Basis,
+    elements: u32,
+}
+
+/// No primitive: the origin of a ray is on none.
+pub const NOWHERE: u32 = u32::MAX;
+
+impl<'m> PlaneScene<'m> {
+    /// Bytes for a scene of this input.
+    pub fn bytes(input: &PlaneInput<'_>) -> Result<usize, Error> {
+        let primitives = input.bodies.iter().map(|b| segments(&b.shape)).fold(0, usize::saturating_add);
+        Need::new()
+            .and::<Primitive>(primitives)
+            .and::<Body>(input.bodies.len())
+            .and::<Material>(input.materials.len())
+            .bytes()
+    }
+
+    /// Checks the input and lays it out.
+    ///
+    /// # Errors
+    /// Every fault of the input with its index ([`Error::Body`], [`Error::MaterialRange`],
+    /// [`Error::ReflectanceSum`], [`Error::MaterialOutOfRange`], [`Error::NoFacets`], [`Error::NoMaterials`]);
+    /// [`Error::BufferTooSmall`].
+    pub fn new(input: &PlaneInput<'_>, basis: Basis, memory: &'m mut [u8]) -> Result<PlaneScene<'m>, Error> {
+        check(input)?;
+        let mut arena = Arena::new(memory, PlaneScene::bytes(input)?)?;
+        let count = input.bodies.iter().map(|b| segments(&b.shape)).sum();
+        let primitives = arena.take::<Primitive>(count)?;
+        let bodies = arena.take::<Body>(input.bodies.len())?;
+        let materials = arena.take::<Material>(input.materials.len())?;
+        for (material, kept) in input.materials.iter().zip(materials.iter_mut()) {
+            *kept = Material::new(material)?;
+        }
+        let (mut first, mut elements) = (0, 0u32);
+        for (index, (body, kept)) in input.bodies.iter().zip(bodies.iter_mut()).enumerate() {
+            let count = segments(&body.shape);
+            *kept = lay_out(body, index, first, &mut elements, &mut primitives[first..first + count])?;
+            first += count;
+        }
+        Ok(PlaneScene { primitives, bodies, materials, basis, elements })
+    }
+
+    /// All primitives.
+    pub fn primitives(&self) -> &'m [Primitive] {
+        self.primitives
+    }
+
+    /// All bodies.
+    pub fn bodies(&self) -> &'m [Body] {
+        self.bodies
+    }
+
+    /// How the diffuse radiance varies between the unknowns.
+    pub fn basis(&self) -> Basis {
+        self.basis
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.elements as usize * self.basis.order() as usize
+    }
+
+    /// rho_d of a material.
+    #[inline(always)]
+    pub fn diffuse(&self, material: u32) -> f64 {
+        self.materials.get(material as usize).map_or(0.0, |m| m.diffuse)
+    }
+
+    /// rho_s, or rho_0, of a material.
+    #[inline(always)]
+    pub fn specular(&self, material: u32) -> f64 {
+        self.materials.get(material as usize).map_or(0.0, |m| m.specular)
+    }
+
+    /// A material's lobe and the rays that stand for it.
+    #[inline(always)]
+    pub fn lobe(&self, material: u32) -> Option<(&'m PlaneLobe, RaySet)> {
+        let material = self.materials.get(material as usize)?;
+        material.rays().map(|rays| (&material.lobe, rays))
+    }
+
+    /// Whether any material mirrors.
+    pub fn mirrors(&self) -> bool {
+        self.bodies.iter().any(|b| self.specular(b.material) > 0.0)
+    }
+
+    /// The primitive of an unknown and the unknown's parameter on it.
+    pub fn unknown(&self, unknown: usize) -> (usize, f64) {
+        let order = self.basis.order();
+        let (element, node) = (unknown as u32 / order, unknown % order as usize);
+        let primitive = self.primitives.partition_point(|p| p.first + p.elements <= element);
+        let Some(p) = self.primitives.get(primitive) else { return (0, 0.5) };
+        let x = NODES[order as usize].at[node];
+        (primitive, (f64::from(element - p.first) + x) / f64::from(p.elements))
+    }
+
+    /// The point of parameter `v` (0 to 1) of a primitive: on a circle the angle in turns; on a segment
+    /// of more than one element counted so that elements shrink toward its ends.
+    pub fn place(&self, primitive: usize, v: f64) -> Place {
+        let Some(p) = self.primitives.get(primitive) else {
+            return Place { point: Vec2::ZERO, normal: Vec2::Y };
+        };
+        let (a, b) = (Vec2::from(p.a), Vec2::from(p.b));
+        if p.kind == 0 {
+            let normal = Vec2::new(cos(TAU * v), sin(TAU * v));
+            return Place { point: a + normal * b.x, normal };
+        }
+        let t = if p.elements == 1 { v } else { v * v * (3.0 - 2.0 * v) };
+        Place { point: a + (b - a) * t, normal: Vec2::from(p.normal) }
+    }
+
+    /// The parameter of a point on a primitive: the inverse of [`PlaneScene::place`].
+    #[inline]
+    pub fn parameter(&self, primitive: usize, point: Vec2) -> f64 {
+        let Some(p) = self.primitives.get(primitive) else { return 0.5 };
+        let a = Vec2::from(p.a);
+        if p.kind == 0 {
+            let turns = atan2(point.y - a.y, point.x - a.x) / TAU;
+            return if turns < 0.0 { turns + 1.0 } else { turns };
+        }
+        let along = Vec2::from(p.b) - a;
+        let t = ((point - a).dot(along) / along.dot(along)).clamp(0.0, 1.0);
+        if p.elements == 1 {
+            return t;
+        }
+        // the root of v^2 (3 - 2 v) = t
+        0.5 - sin(asin(1.0 - 2.0 * t) / 3.0)
+    }
+
+    /// The weights of the unknowns whose sum is the diffuse radiance at parameter `v` of a primitive.
+    #[inline]
+    pub fn stencil(&self, primitive: usize, v: f64) -> Stencil {
+        let Some(p) = self.primitives.get(primitive) else { return Stencil::NONE };
+        let w = v * f64::from(p.elements);
+        match self.basis {
+            Basis::Constant => Stencil::one(p.first + (w as u32).min(p.elements - 1)),
+            Basis::Linear => self.linear(p, w),
+            Basis::Panels(_) => {
+                let element = (w as u32).min(p.elements - 1);
+                Stencil::panel(self.basis.order() as usize, p.first + element, w - f64::from(element))
+            }
+        }
+    }
+
+    /// Linear between the centres around `w` elements from the start of `p`: around a circle or a smooth
+    /// polyline, or within a segment, whose ends are extrapolated.
+    fn linear(&self, p: &Primitive, w: f64) -> Stencil {
+        let (first, count, wraps) = self.run(p);
+        let w = w + f64::from(p.first - first) - 0.5;
+        if count == 1 {
+            return Stencil::one(first);
+        }
+        let below = floor(w);
+        let below = if wraps { below } else { below.clamp(0.0, f64::from(count - 2)) };
+        let share = w - below;
+        let wrapped = |i: f64| {
+            let i = if i < 0.0 { i + f64::from(count) } else { i };
+            let i = if i >= f64::from(count) { i - f64::from(count) } else { i };
+            first + i as u32
+        };
+        let mut stencil = Stencil::NONE;
+        stencil.len = 2;
+        stencil.unknowns[..2].copy_from_slice(&[wrapped(below), wrapped(below + 1.0)]);
+        stencil.weights[..2].copy_from_slice(&[1.0 - share, share]);
+        stencil
+    }
+
+    /// The elements that follow one another smoothly around `p`: first, count, and whether they close.
+    fn run(&self, p: &Primitive) -> (u32, u32, bool) {
+        match self.bodies.get(p.body as usize) {
+            Some(body) if p.smooth == 1 => {
+                let parts = &self.primitives[body.first as usize..(body.first + body.count) as usize];
+                let first = parts.first().map_or(0, |q| q.first);
+                (first, parts.iter().map(|q| q.elements).sum(), body.closed == 1)
+            }
+            _ => (p.first, p.elements, p.kind == 0),
+        }
+    }
+}
+
+/// Unknowns and their weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stencil {
+    /// Unknowns.
+    pub unknowns: [u32; MAX_ORDER],
+    /// Their weights, of sum 1.
+    pub weights: [f64; MAX_ORDER],
+    /// How many.
+    pub len: usize,
+}
+
+impl Stencil {
+    const NONE: Stencil = Stencil { unknowns: [0; MAX_ORDER], weights: [0.0; MAX_ORDER], len: 0 };
+
+    /// Unknowns with their weights.
+    #[inline(always)]
+    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.unknowns.iter().zip(&self.weights).take(self.len).map(|(&u, &w)| (u as usize, w))
+    }
+
+    fn one(unknown: u32) -> Stencil {
+        let mut stencil = Stencil::NONE;
+        stencil.len = 1;
+        stencil.unknowns[0] = unknown;
+        stencil.weights[0] = 1.0;
+        stencil
+    }
+
+    /// Lagrange's polynomials of the element's Gauss points at `x`.
+    #[inline]
+    fn panel(order: usize, element: u32, x: f64) -> Stencil {
+        let nodes = &NODES[order];
+        let mut stencil = Stencil::NONE;
+        stencil.len = order;
+        for k in 0..order {
+            let others = (0..order).filter(|&j| j != k).map(|j| x - nodes.at[j]);
+            stencil.unknowns[k] = element * order as u32 + k as u32;
+            stencil.weights[k] = others.fold(nodes.scale[k], |product, d| product * d);
+        }
+        stencil
+    }
+}
+
+/// Gauss points of an element and the factors of Lagrange's polynomials through them.
+struct Nodes {
+    at: [f64; MAX_ORDER],
+    scale: [f64; MAX_ORDER],
+}
+
+const fn nodes<const N: usize>() -> Nodes {
+    let rule = Gauss::<N>::new();
+    let mut out = Nodes { at: [0.5; MAX_ORDER], scale: [1.0; MAX_ORDER] };
+    let mut k = 0;
+    while k < N {
+        out.at[k] = rule.nodes[k];
+        let mut j = 0;
+        while j < N {
+            if j != k {
+                out.scale[k] /= rule.nodes[k] - rule.nodes[j];
+            }
+            j += 1;
+        }
+        k += 1;
+    }
+    out
+}
+
+static NODES: [Nodes; MAX_ORDER + 1] =
+    [nodes::<1>(), nodes::<1>(), nodes::<2>(), nodes::<3>(), nodes::<4>(), nodes::<5>(), nodes::<6>()];
+
+fn segments(shape: &Shape<'_>) -> usize {
+    match shape {
+        Shape::Circle { .. } => 1,
+        Shape::Polyline { points, closed: true, .. } => points.len(),
+        Shape::Polyline { points, closed: false, .. } => points.len().saturating_sub(1),
+    }
+}
+
+fn check(input: &PlaneInput<'_>) -> Result<(), Error> {
+    if input.bodies.is_empty() {
+        return Err(Error::NoFacets);
+    }
+    if input.materials.is_empty() {
+        return Err(Error::NoMaterials);
+    }
+    for (material, m) in input.materials.iter().enumerate() {
+        for (field, value) in [(Field::Diffuse, m.diffuse), (Field::Specular, m.specular)] {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(Error::MaterialRange { material, band: 0, field, value });
+            }
+        }
+        let sum = m.diffuse + m.specular;
+        if sum > 1.0 + 1e-12 {
+            return Err(Error::ReflectanceSum { material, band: 0, sum });
+        }
+        if let Some(gloss) = m.gloss {
+            check_gloss(material, &gloss)?;
+        }
+    }
+    for (body, b) in input.bodies.iter().enumerate() {
+        check_body(body, b)?;
+        if b.material >= input.materials.len() {
+            let materials = input.materials.len();
+            return Err(Error::MaterialOutOfRange { facet: body, material: b.material, materials });
+        }
+    }
+    Ok(())
+}
+
+fn check_gloss(material: usize, gloss: &PlaneGloss) -> Result<(), Error> {
+    let value = gloss.axis_ratio;
+    if !(value >= 1.0 && value.is_finite()) {
+        return Err(Error::MaterialRange { material, band: 0, field: Field::AxisRatio, value });
+    }
+    let bad = match gloss.rays {
+        RaySet::Paper { spacing, .. } => (!(0.0..=3.2).contains(&spacing)).then_some(spacing),
+        RaySet::Gauss(n) | RaySet::Equal(n) | RaySet::Split(n) => {
+            n.iter().find(|&&n| !(1..=4096).contains(&n)).map(|&n| f64::from(n))
+        }
+    };
+    bad.map_or(Ok(()), |value| {
+        Err(Error::MaterialRange { material, band: 0, field: Field::GlossRays, value })
+    })
+}
+
+/// Sizes and coordinates whose squares f64 holds.
+fn sane(x: f64) -> bool {
+    x.is_finite() && crate::math::fabs(x) < 1e100
+}
+
+fn check_body(body: usize, input: &BodyInput<'_>) -> Result<(), Error> {
+    let fault = |what| Err(Error::Body { body, what });
+    if !(1..=1 << 20).contains(&input.elements) {
+        return fault("elements are not 1 to 2^20");
+    }
+    match input.shape {
+        Shape::Circle { centre, radius } => {
+            if !(centre.into_iter().all(sane) && sane(radius)) {
+                return fault("a value is not finite or beyond 1e100");
+            }
+            if radius <= 1e-100 {
+                return fault("radius is not positive");
+            }
+        }
+        Shape::Polyline { points, closed, .. } => {
+            if !points.iter().flatten().all(|&x| sane(x)) {
+                return fault("a value is not finite or beyond 1e100");
+            }
+            if points.len() < if closed { 3 } else { 2 } {
+                return fault("too few points");
+            }
+            let next = |i: usize| points[(i + 1) % points.len()];
+            if (0..segments(&input.shape))
+                .any(|i| length(Vec2::from(next(i)) - Vec2::from(points[i])) <= 1e-100)
+            {
+                return fault("two successive points coincide");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Lays out one body's primitives; counts its elements on.
+fn lay_out(
+    input: &BodyInput<'_>,
+    body: usize,
+    first: usize,
+    elements: &mut u32,
+    out: &mut [Primitive],
+) -> Result<Body, Error> {
+    let material = input.material as u32;
+    let count = out.len() as u32;
+    let mut kept = Body { first: first as u32, count, closed: 1, material, ..Body::default() };
+    for (i, p) in out.iter_mut().enumerate() {
+        *p = match input.shape {
+            Shape::Circle { centre, radius } => {
+                Primitive { a: centre, b: [radius, 0.0], ..Primitive::default() }
+            }
+            Shape::Polyline { points, smooth, .. } => {
+                Primitive { kind: 1, smooth: u32::from(smooth), ..segment(&input.shape, points, i) }
+            }
+        };
+        *p = Primitive { body: body as u32, material, elements: input.elements, first: *elements, ..*p };
+        let limit = 1 << 26;
+        *elements = elements.saturating_add(input.elements);
+        if *elements > limit {
+            return Err(Error::TooMany { what: "elements", limit: limit as usize });
+        }
+    }
+    match input.shape {
+        Shape::Circle { centre, radius } => (kept.centre, kept.radius) = (centre, radius),
+        Shape::Polyline { points, closed, .. } => {
+            kept.closed = u32::from(closed);
+            let sum = points.iter().fold(Vec2::ZERO, |sum, &p| sum + Vec2::from(p) / points.len() as f64);
+            let radius = points.iter().fold(0.0, |r: f64, &p| r.max(length(Vec2::from(p) - sum)));
+            (kept.centre, kept.radius) = (sum.to_array(), radius * (1.0 + 1e-12));
+        }
+    }
+    Ok(kept)
+}
+
+/// Segment `i` of a polyline with its normals.
+fn segment(shape: &Shape<'_>, points: &[[f64; 2]], i: usize) -> Primitive {
+    let (n, count) = (points.len(), segments(shape));
+    let ends = |i: usize| (Vec2::from(points[i]), Vec2::from(points[(i + 1) % n]));
+    let normal = |i: usize| {
+        let (a, b) = ends(i);
+        let d = b - a;
+        Vec2::new(d.y, -d.x) / length(d)
+    };
+    let between = |i: usize, j: usize| {
+        let sum = normal(i) + normal(j);
+        let size = length(sum);
+        if size > 1e-9 { sum / size } else { normal(i) }
+    };
+    let closed = count == n;
+    let before = if i > 0 { i - 1 } else { if closed { n - 1 } else { 0 } };
+    let after = if i + 1 < count { i + 1 } else { if closed { 0 } else { i } };
+    let (a, b) = ends(i);
+    Primitive {
+        a: a.to_array(),
+        b: b.to_array(),
+        normal: normal(i).to_array(),
+        start_normal: between(before, i).to_array(),
+        end_normal: between(i, after).to_array(),
+        ..Primitive::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stencils_reproduce_polynomials() {
+        for order in 1..=MAX_ORDER {
+            for x in [-0.1, 0.0, 0.3, 0.99] {
+                let stencil = Stencil::panel(order, 0, x);
+                for power in 0..order as i32 {
+                    let sum: f64 = stencil.terms().map(|(u, w)| w * NODES[order].at[u].powi(power)).sum();
+                    assert!((sum - x.powi(power)).abs() < 1e-13, "{order} {power} {x}: {sum}");
+                }
+            }
+        }
+    }
+}
