@@ -27,7 +27,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Settings with which bodies cut finely enough reach this error, relative to the sky.
+    /// Settings with which bodies that are cut finely enough reach this error, relative to the sky: circles of
+    /// 12 elements at 1e-4 and of 16 at 1e-5 in the two-circle study, more where bodies nearly touch.
     pub fn for_tolerance(tolerance: f64) -> Settings {
         let t = tolerance.clamp(1e-13, 0.1);
         let points = if t >= 5e-5 {

@@ -123,6 +123,11 @@ impl Sink for Eye<'_> {
         self.seen.radiance += leg.through * (smooth + sun);
     }
 
+    fn back(&mut self) {
+        self.seen.rays += 1;
+        self.seen.object = true;
+    }
+
     fn escape(&mut self, leg: &Leg) {
         self.seen.rays += 1;
         self.seen.radiance += leg.through * self.solved.light.radiance(leg.direction, leg.depth > 0);

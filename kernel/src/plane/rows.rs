@@ -3,7 +3,7 @@
 
 use crate::arena::plain_struct;
 use crate::error::Error;
-use crate::math::floor;
+use crate::math::{floor, sqrt};
 use crate::plane::light::Light;
 use crate::plane::scene::{PlaneScene, Primitive};
 use crate::plane::trace::{Chains, Hit, Leg, Sink, graded, nodes};
@@ -290,7 +290,13 @@ impl Station<'_> {
         let mut from = span.from;
         let mut part = |to: f64, sink: &mut S, scratch: &mut Scratch<'_>| {
             let width = to - from;
-            let n = if width > 1e-5 { points } else { 1 };
+            // what a narrow part can be wrong by is a share of its width
+            let n = match width {
+                w if w > 0.03 => points,
+                w if w > 1e-3 => points.min(4),
+                w if w > 1e-5 => points.min(2),
+                _ => 1,
+            };
             graded(n, |x, w| self.chains.follow(self.leg(from + width * x, 0.5 * width * w), sink, scratch));
             from = to;
         };
@@ -300,10 +306,11 @@ impl Station<'_> {
                 let s = span.from + (span.to - span.from) * x * x * (3.0 - 2.0 * x);
                 Probe { s, signature: self.signature(s) }
             };
+            let bisections = if points <= 6 { 11 } else { 16 };
             let mut before = probe(0);
             for i in 1..PROBES {
                 let next = probe(i);
-                self.changes(before, next, BISECTIONS, &mut |s| part(s, sink, scratch));
+                self.changes(before, next, bisections, &mut |s| part(s, sink, scratch));
                 before = next;
             }
         }
@@ -325,15 +332,19 @@ impl Station<'_> {
     }
 
     /// A number that tells apart which mirrors the chain along sine `s` meets, whether the sun shines on them,
-    /// and between which jumps of the sky it escapes; mirrors that bring less than 1e-3 do not count.
+    /// and where it escapes; mirrors that bring less than the root of the cutoff do not count.
     fn signature(&self, s: f64) -> u64 {
         let scene = self.chains.scene;
         let mut leg = self.leg(s, 1.0);
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut mix = |value: u64| hash = (hash ^ value).wrapping_mul(0x0000_0100_0000_01b3);
         let sun = self.light.filter(|l| l.sun().is_some());
-        while leg.through > FAINTEST && leg.depth <= self.chains.most {
+        let mut normal = self.normal;
+        let faintest = sqrt(self.cutoff);
+        while leg.through > faintest && leg.depth <= self.chains.most {
             let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip) else {
+                // chains that escape to either side of a trapped one
+                mix(u64::from(cross(normal, leg.direction) > 0.0));
                 for (i, cut) in self.chains.cuts.iter().enumerate() {
                     mix((i as u64) << 1 | u64::from(cross(*cut, leg.direction) > 0.0));
                 }
@@ -347,6 +358,7 @@ impl Station<'_> {
             if scene.lobe(p.material).is_some() {
                 break;
             }
+            normal = hit.normal;
             let mirrored = scene.mirrored(&hit, leg.direction);
             let through = leg.through * scene.specular(p.material);
             leg = Leg { origin: hit.point, direction: mirrored, skip: hit.primitive, through, ..leg };
@@ -358,10 +370,6 @@ impl Station<'_> {
 
 /// First guesses a span at where chains change.
 const PROBES: usize = 12;
-/// Halvings between two of them.
-const BISECTIONS: u32 = 16;
-/// Chains that bring less are not followed in search of changes.
-const FAINTEST: f64 = 1e-3;
 
 /// The chain along one direction.
 #[derive(Clone, Copy)]

@@ -119,6 +119,8 @@ pub(crate) trait Sink {
     fn meet(&mut self, hit: &Hit, leg: &Leg);
     /// The chain leaves the object.
     fn escape(&mut self, leg: &Leg);
+    /// A black back is met.
+    fn back(&mut self) {}
     /// A lobe is met, around the direction `mirrored`; `through` includes its reflectance.
     fn glossy(&mut self, _hit: &Hit, _mirrored: Vec2, _lobe: &PlaneLobe, _leg: &Leg) {}
     /// A chain is cut that could still bring so much of the brightest light.
@@ -148,7 +150,7 @@ impl Chains<'_> {
                 return sink.escape(&leg);
             };
             if !hit.front {
-                return;
+                return sink.back();
             }
             sink.meet(&hit, &leg);
             match self.reflected(&hit, leg, sink, scratch) {
