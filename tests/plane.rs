@@ -10,13 +10,13 @@ mod plane_kernel;
 mod plane_reference;
 
 use blik_kernel::plane::Vec2;
-use blik_kernel::plane::host::{self, Settings};
+use blik_kernel::plane::host::Settings;
 use blik_kernel::plane::light::{Light, Sky};
 use blik_kernel::plane::rows::{self, Method, RowInfo, RowSettings};
 use blik_kernel::plane::scene::{Basis, BodyInput, PlaneInput, PlaneMaterial, PlaneScene, RaySet, Shape};
 use blik_kernel::plane::view::Scratch;
 use blik_kernel::{Error, Field};
-use plane_kernel::{SAMPLES, eps, image, method, pair, solve, uniform, variants, view};
+use plane_kernel::{SAMPLES, eps, flat, image, method, pair, solve, uniform, variants};
 use plane_reference::diffuse::{Resolution, Solution};
 use plane_reference::scene::{Scene, Shape as Form, Surface, V};
 use std::f64::consts::PI;
@@ -119,29 +119,6 @@ fn t1_form_factor_between_circles() {
         // the midpoint rule over the circle, whose integrand has kinks where the other circle rises
         assert!((mean - exact).abs() < tolerance, "{n}: {mean} {exact}");
     }
-}
-
-/// A circle as a polygon of `n` sides.
-fn polygon(x: f64, n: usize) -> Vec<[f64; 2]> {
-    let corner = |i: usize| {
-        let (s, c) = (2.0 * PI * i as f64 / n as f64).sin_cos();
-        [x + c, s]
-    };
-    (0..n).map(corner).collect()
-}
-
-/// The study's method A: the two circles as polygons, facet normals, constant on facets. `smooth`: its method F.
-fn flat(n: usize, rho: (f64, f64), settings: &Settings, smooth: bool) -> Vec<Option<f64>> {
-    let points = [polygon(-1.25, n), polygon(1.25, n)];
-    let body = |points| BodyInput {
-        shape: Shape::Polyline { points, closed: true, smooth },
-        material: 0,
-        elements: 1,
-    };
-    let bodies = [body(&points[0]), body(&points[1])];
-    let materials = [PlaneMaterial { diffuse: rho.0, specular: rho.1, gloss: None }];
-    let input = PlaneInput { bodies: &bodies, materials: &materials };
-    host::solve(&input, &uniform(), settings, |solved, _, scratch| view(solved, 0.0, scratch)).unwrap()
 }
 
 #[test]

@@ -37,7 +37,8 @@ fn capped() -> Settings {
 
 type Image = Vec<Option<f64>>;
 
-/// The study's truth for the lobe number `i` of [`RATIOS`]: error 2e-4, 3e-5 and 1e-6 (against a finer rule).
+/// The study's truth for the lobe number `i` of [`RATIOS`]: eps 1.3e-4, 5e-5 and 2e-5 against rules of 1.6 to 2
+/// times as many points.
 fn truth(i: usize) -> &'static Image {
     static TRUTHS: [OnceLock<Image>; 3] = [const { OnceLock::new() }; 3];
     TRUTHS[i].get_or_init(|| {
@@ -291,7 +292,8 @@ fn sun_in_a_cone_or_in_the_lobe() {
                 assert!((eps / want - 1.0).abs() < 0.06, "{eps} {want}");
             }
         }
-        // evaluated directly, the lobe shows the sun exactly at the first hit; no cone is added
+        // evaluated directly, the lobe shows the sun exactly at the first hit; no cone is added. The truth's own error
+        // is 5e-5, 7e-5 and 9e-4, by rules of twice as many points
         let direct = got(&scene, RaySet::Split([24, 8, 4]), &sun(None));
         println!("T = {ratio}: lobe evaluated {direct:.2e}");
         assert!(direct < 0.2 * table[i][0][0], "{direct}");

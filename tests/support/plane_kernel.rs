@@ -78,6 +78,30 @@ pub fn solve<R>(
         .unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// A circle of radius 1 as a polygon of `n` sides.
+fn polygon(x: f64, n: usize) -> Vec<[f64; 2]> {
+    let corner = |i: usize| {
+        let (s, c) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
+        [x + c, s]
+    };
+    (0..n).map(corner).collect()
+}
+
+/// The study's method A: two circles at 2.5 as polygons of `n` sides. `smooth`: with interpolated normals, method F.
+pub fn flat(n: usize, rho: (f64, f64), settings: &Settings, smooth: bool) -> Vec<Option<f64>> {
+    let points = [polygon(-1.25, n), polygon(1.25, n)];
+    let body = |points| BodyInput {
+        shape: Body::Polyline { points, closed: true, smooth },
+        material: 0,
+        elements: 1,
+    };
+    let bodies = [body(&points[0]), body(&points[1])];
+    let materials = [PlaneMaterial { diffuse: rho.0, specular: rho.1, gloss: None }];
+    let input = PlaneInput { bodies: &bodies, materials: &materials };
+    host::solve(&input, &uniform(), settings, |solved, _, scratch| view(solved, 0.0, scratch))
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
 /// A uniform sky of 1.
 pub fn uniform() -> Light<'static> {
     Light::new(Sky::Uniform(1.0), None).unwrap()
