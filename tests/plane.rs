@@ -358,4 +358,42 @@ fn faults_name_the_offender() {
         Error::BufferTooSmall { needed, given: needed - 1 }
     );
     assert!(Light::new(Sky::Uniform(f64::NAN), None).is_err());
+
+    // working memory of a smaller scene
+    let mut memory = vec![0; needed];
+    let scene = PlaneScene::new(&input, Basis::Linear, &mut memory).unwrap();
+    let two = PlaneInput { bodies: &[body(round(1.0), 0), body(round(2.0), 0)], materials: &[good] };
+    let mut memory = vec![0; PlaneScene::bytes(&two).unwrap()];
+    let larger = PlaneScene::new(&two, Basis::Linear, &mut memory).unwrap();
+    let mut memory = vec![0; Scratch::bytes(&scene, 0).unwrap()];
+    let mut scratch = Scratch::new(&scene, 0, &mut memory).unwrap();
+    let settings = RowSettings { method: Method::Facets { chains: 1 }, max_bounces: None, cutoff: 1e-9 };
+    let (mut matrix, mut open, mut info) = ([0.0; 8], [0.0; 1], [RowInfo::default(); 1]);
+    assert_eq!(
+        rows::fill(&larger, &settings, 0..1, &mut matrix, &mut open, &mut info, &mut scratch).unwrap_err(),
+        Error::Mismatch { what: "plane scratch" }
+    );
+}
+
+#[test]
+fn elements_beyond_counting_by_ulps() {
+    // positions along a circle of 2^17 elements have no digits left for a small step back
+    let circle = |x, elements| BodyInput {
+        shape: Shape::Circle { centre: [x, 0.0], radius: 1.0 },
+        material: usize::from(elements > 8),
+        elements,
+    };
+    let matt = PlaneMaterial { diffuse: 0.5, specular: 0.0, gloss: None };
+    let black = PlaneMaterial { diffuse: 0.0, ..matt };
+    let input = PlaneInput { bodies: &[circle(-1.25, 8), circle(1.25, 1 << 17)], materials: &[matt, black] };
+    let mut memory = vec![0; PlaneScene::bytes(&input).unwrap()];
+    let scene = PlaneScene::new(&input, Basis::Constant, &mut memory).unwrap();
+    let mut memory = vec![0; Scratch::bytes(&scene, 0).unwrap()];
+    let mut scratch = Scratch::new(&scene, 0, &mut memory).unwrap();
+    let settings = RowSettings { method: Method::Facets { chains: 0 }, max_bounces: None, cutoff: 1e-9 };
+    let (mut matrix, mut open, mut info) = (vec![0.0; scene.unknowns()], [0.0; 1], [RowInfo::default(); 1]);
+    rows::fill(&scene, &settings, 0..1, &mut matrix, &mut open, &mut info, &mut scratch).unwrap();
+    let sum: f64 = matrix.iter().sum();
+    // rounding of 40,000 sines
+    assert!(open[0] < 0.9 && (sum + open[0] - 1.0).abs() < 1e-10, "{sum} {}", open[0]);
 }

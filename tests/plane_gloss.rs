@@ -18,7 +18,7 @@ use blik_kernel::plane::scene::{Basis, RaySet};
 use plane_kernel::{SAMPLES, eps, pair, solve, uniform, view};
 use plane_reference::diffuse::coupled;
 use plane_reference::gloss::Gloss;
-use plane_reference::scene::Scene;
+use plane_reference::scene::{Scene, Shape, Surface};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -330,4 +330,25 @@ fn isolated_body_in_the_sun_is_exact() {
         solve(&scene, 1, RaySet::Gauss([3; 3]), &light, &capped(), |s, _, scratch| view(s, 0.0, scratch));
     // rounding
     assert!(eps(&image, &truth) < 1e-12);
+}
+
+#[test]
+fn a_gallery_of_perfect_lobes_ends() {
+    // light runs to and fro between two glossy walls that absorb nothing: chains end at 64 lobes
+    let wall = |a: [f64; 2], b: [f64; 2]| Surface {
+        shape: Shape::Segment { a, b },
+        diffuse: 0.0,
+        specular: 1.0,
+        lobe: Some(5000.0),
+    };
+    let walls = vec![wall([-1.0, 0.0], [-1.0, 50.0]), wall([1.0, 50.0], [1.0, 0.0])];
+    let ray = (Vec2::new(0.0, 25.0), Vec2::new(1.0, 0.0));
+    let walls = Scene { surfaces: walls };
+    let settings = Settings { max_bounces: None, cutoff: 1e-9, ..capped() };
+    for set in [RaySet::Gauss([1; 3]), RaySet::Split([1; 3])] {
+        let seen =
+            solve(&walls, 1, set, &uniform(), &settings, |s, _, scratch| s.radiance(ray.0, ray.1, scratch));
+        assert!(seen.radiance.is_finite() && seen.radiance <= 1.0 && seen.lost <= 1.0 + 1e-12, "{seen:?}");
+        assert!(seen.rays >= 60, "{seen:?}");
+    }
 }

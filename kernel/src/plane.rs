@@ -26,6 +26,7 @@ pub mod lobe;
 pub mod rows;
 pub mod scene;
 pub mod solve;
+pub mod stencil;
 pub mod trace;
 pub mod view;
 

@@ -163,7 +163,8 @@ impl Solved<'_> {
 /// The samples of `range` of a view, to `out`.
 ///
 /// # Errors
-/// [`Error::Length`] where `out` does not fit the range.
+/// [`Error::Length`] where `out` does not fit the range; [`Error::Mismatch`] where the scratch is another scene's
+/// or has no room for the light's cuts.
 pub fn fill(
     solved: &Solved<'_>,
     view: &View,
@@ -174,6 +175,7 @@ pub fn fill(
     if out.len() != range.len() {
         return Err(Error::Length { what: "samples", expected: range.len(), given: out.len() });
     }
+    scratch.check(solved.scene, solved.light.cuts().len())?;
     for (sample, out) in range.zip(out) {
         let (origin, direction) = view.ray(view.abscissa(sample));
         *out = solved.radiance(origin, direction, scratch);

@@ -230,7 +230,8 @@ impl Sink for Gatherer<'_> {
 /// [`crate::plane::rows::fill`] wrote for the same range: under a uniform sky and no sun nothing is traced.
 ///
 /// # Errors
-/// [`Error::Length`].
+/// [`Error::Length`]; [`Error::Mismatch`] where the scratch is another scene's or has no room for the light's
+/// cuts.
 pub fn fill(
     scene: &PlaneScene<'_>,
     light: &Light<'_>,
@@ -247,6 +248,7 @@ pub fn fill(
             return Err(Error::Length { what, expected, given });
         }
     }
+    scratch.check(scene, light.cuts().len())?;
     let closed = light.is_uniform();
     let traced = !closed || light.sun.is_some();
     for (unknown, (open, out)) in range.zip(open.chunks_exact(classes).zip(out.chunks_exact_mut(classes))) {

@@ -115,7 +115,8 @@ impl Sink for Row<'_> {
 /// nothing diffusely stay 0.
 ///
 /// # Errors
-/// [`Error::Length`] where a slice does not fit the range.
+/// [`Error::Length`] where a slice does not fit the range; [`Error::Mismatch`] where the scratch is another
+/// scene's.
 pub fn fill(
     scene: &PlaneScene<'_>,
     settings: &RowSettings,
@@ -137,6 +138,7 @@ pub fn fill(
             return Err(Error::Length { what, expected, given });
         }
     }
+    scratch.check(scene, 0)?;
     let outputs = matrix.chunks_exact_mut(size.max(1)).zip(open.chunks_exact_mut(classes)).zip(info);
     for (unknown, ((matrix, open), info)) in range.zip(outputs) {
         matrix.fill(0.0);
@@ -236,7 +238,7 @@ impl Station<'_> {
         }
         let mut from = span.from;
         while from < span.to {
-            let edge = floor(at - 1e-12).max(low);
+            let edge = (-floor(-at) - 1.0).max(low); // the next whole number below
             let to = if edge > low { self.sine(index, edge / count).clamp(from, span.to) } else { span.to };
             let centre = floor(0.5 * (at + edge)) + 0.5;
             let weight = 0.5 * (to - from);

@@ -1,12 +1,17 @@
 //! Circles and polylines, checked and cut into elements.
 
+mod check;
+mod layout;
+
 use crate::arena::{Arena, Need, plain_struct};
-use crate::error::{Error, Field};
+use crate::error::Error;
 use crate::math::{TAU, asin, atan2, cos, floor, sin};
+use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;
-use crate::plane::{Vec2, length};
-use crate::quadrature::Gauss;
+use crate::plane::stencil::{MAX_ORDER, NODES, Stencil};
 use crate::scene::MIRROR_AXIS_RATIO;
+use check::check;
+use layout::lay_out;
 
 /// How a lobe is replaced by rays where a chain meets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,9 +123,6 @@ pub enum Basis {
     /// So many unknowns an element (1 to [`MAX_ORDER`]), the polynomial through its Gauss points.
     Panels(u32),
 }
-
-/// Most Gauss points of an element.
-pub const MAX_ORDER: usize = 6;
 
 impl Basis {
     /// Unknowns of an element.
@@ -422,249 +424,11 @@ impl<'m> PlaneScene<'m> {
     }
 }
 
-/// Unknowns and their weights.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stencil {
-    /// Unknowns.
-    pub unknowns: [u32; MAX_ORDER],
-    /// Their weights, of sum 1.
-    pub weights: [f64; MAX_ORDER],
-    /// How many.
-    pub len: usize,
-}
-
-impl Stencil {
-    const NONE: Stencil = Stencil { unknowns: [0; MAX_ORDER], weights: [0.0; MAX_ORDER], len: 0 };
-
-    /// Unknowns with their weights.
-    #[inline(always)]
-    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.unknowns.iter().zip(&self.weights).take(self.len).map(|(&u, &w)| (u as usize, w))
-    }
-
-    fn one(unknown: u32) -> Stencil {
-        let mut stencil = Stencil::NONE;
-        stencil.len = 1;
-        stencil.unknowns[0] = unknown;
-        stencil.weights[0] = 1.0;
-        stencil
-    }
-
-    /// Lagrange's polynomials of the element's Gauss points at `x`.
-    #[inline]
-    fn panel(order: usize, element: u32, x: f64) -> Stencil {
-        let nodes = &NODES[order];
-        let mut stencil = Stencil::NONE;
-        stencil.len = order;
-        for k in 0..order {
-            let others = (0..order).filter(|&j| j != k).map(|j| x - nodes.at[j]);
-            stencil.unknowns[k] = element * order as u32 + k as u32;
-            stencil.weights[k] = others.fold(nodes.scale[k], |product, d| product * d);
-        }
-        stencil
-    }
-}
-
-/// Gauss points of an element and the factors of Lagrange's polynomials through them.
-struct Nodes {
-    at: [f64; MAX_ORDER],
-    scale: [f64; MAX_ORDER],
-}
-
-const fn nodes<const N: usize>() -> Nodes {
-    let rule = Gauss::<N>::new();
-    let mut out = Nodes { at: [0.5; MAX_ORDER], scale: [1.0; MAX_ORDER] };
-    let mut k = 0;
-    while k < N {
-        out.at[k] = rule.nodes[k];
-        let mut j = 0;
-        while j < N {
-            if j != k {
-                out.scale[k] /= rule.nodes[k] - rule.nodes[j];
-            }
-            j += 1;
-        }
-        k += 1;
-    }
-    out
-}
-
-static NODES: [Nodes; MAX_ORDER + 1] =
-    [nodes::<1>(), nodes::<1>(), nodes::<2>(), nodes::<3>(), nodes::<4>(), nodes::<5>(), nodes::<6>()];
-
+/// Primitives of a body.
 fn segments(shape: &Shape<'_>) -> usize {
     match shape {
         Shape::Circle { .. } => 1,
         Shape::Polyline { points, closed: true, .. } => points.len(),
         Shape::Polyline { points, closed: false, .. } => points.len().saturating_sub(1),
-    }
-}
-
-fn check(input: &PlaneInput<'_>) -> Result<(), Error> {
-    if input.bodies.is_empty() {
-        return Err(Error::NoFacets);
-    }
-    if input.materials.is_empty() {
-        return Err(Error::NoMaterials);
-    }
-    for (material, m) in input.materials.iter().enumerate() {
-        for (field, value) in [(Field::Diffuse, m.diffuse), (Field::Specular, m.specular)] {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(Error::MaterialRange { material, band: 0, field, value });
-            }
-        }
-        let sum = m.diffuse + m.specular;
-        if sum > 1.0 + 1e-12 {
-            return Err(Error::ReflectanceSum { material, band: 0, sum });
-        }
-        if let Some(gloss) = m.gloss {
-            check_gloss(material, &gloss)?;
-        }
-    }
-    for (body, b) in input.bodies.iter().enumerate() {
-        check_body(body, b)?;
-        if b.material >= input.materials.len() {
-            let materials = input.materials.len();
-            return Err(Error::MaterialOutOfRange { facet: body, material: b.material, materials });
-        }
-    }
-    Ok(())
-}
-
-fn check_gloss(material: usize, gloss: &PlaneGloss) -> Result<(), Error> {
-    let value = gloss.axis_ratio;
-    if !(value >= 1.0 && value.is_finite()) {
-        return Err(Error::MaterialRange { material, band: 0, field: Field::AxisRatio, value });
-    }
-    let bad = match gloss.rays {
-        RaySet::Paper { spacing, .. } => (!(0.0..=3.2).contains(&spacing)).then_some(spacing),
-        RaySet::Gauss(n) | RaySet::Equal(n) | RaySet::Split(n) => {
-            n.iter().find(|&&n| !(1..=4096).contains(&n)).map(|&n| f64::from(n))
-        }
-    };
-    bad.map_or(Ok(()), |value| {
-        Err(Error::MaterialRange { material, band: 0, field: Field::GlossRays, value })
-    })
-}
-
-/// Sizes and coordinates whose squares f64 holds.
-fn sane(x: f64) -> bool {
-    x.is_finite() && crate::math::fabs(x) < 1e100
-}
-
-fn check_body(body: usize, input: &BodyInput<'_>) -> Result<(), Error> {
-    let fault = |what| Err(Error::Body { body, what });
-    if !(1..=1 << 20).contains(&input.elements) {
-        return fault("elements are not 1 to 2^20");
-    }
-    match input.shape {
-        Shape::Circle { centre, radius } => {
-            if !(centre.into_iter().all(sane) && sane(radius)) {
-                return fault("a value is not finite or beyond 1e100");
-            }
-            if radius <= 1e-100 {
-                return fault("radius is not positive");
-            }
-        }
-        Shape::Polyline { points, closed, .. } => {
-            if !points.iter().flatten().all(|&x| sane(x)) {
-                return fault("a value is not finite or beyond 1e100");
-            }
-            if points.len() < if closed { 3 } else { 2 } {
-                return fault("too few points");
-            }
-            let next = |i: usize| points[(i + 1) % points.len()];
-            if (0..segments(&input.shape))
-                .any(|i| length(Vec2::from(next(i)) - Vec2::from(points[i])) <= 1e-100)
-            {
-                return fault("two successive points coincide");
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Lays out one body's primitives; counts its elements on.
-fn lay_out(
-    input: &BodyInput<'_>,
-    body: usize,
-    first: usize,
-    elements: &mut u32,
-    out: &mut [Primitive],
-) -> Result<Body, Error> {
-    let material = input.material as u32;
-    let count = out.len() as u32;
-    let mut kept = Body { first: first as u32, count, closed: 1, material, ..Body::default() };
-    for (i, p) in out.iter_mut().enumerate() {
-        *p = match input.shape {
-            Shape::Circle { centre, radius } => {
-                Primitive { a: centre, b: [radius, 0.0], ..Primitive::default() }
-            }
-            Shape::Polyline { points, smooth, .. } => {
-                Primitive { kind: 1, smooth: u32::from(smooth), ..segment(&input.shape, points, i) }
-            }
-        };
-        *p = Primitive { body: body as u32, material, elements: input.elements, first: *elements, ..*p };
-        let limit = 1 << 26;
-        *elements = elements.saturating_add(input.elements);
-        if *elements > limit {
-            return Err(Error::TooMany { what: "elements", limit: limit as usize });
-        }
-    }
-    match input.shape {
-        Shape::Circle { centre, radius } => (kept.centre, kept.radius) = (centre, radius),
-        Shape::Polyline { points, closed, .. } => {
-            kept.closed = u32::from(closed);
-            let sum = points.iter().fold(Vec2::ZERO, |sum, &p| sum + Vec2::from(p) / points.len() as f64);
-            let radius = points.iter().fold(0.0, |r: f64, &p| r.max(length(Vec2::from(p) - sum)));
-            (kept.centre, kept.radius) = (sum.to_array(), radius * (1.0 + 1e-12));
-        }
-    }
-    Ok(kept)
-}
-
-/// Segment `i` of a polyline with its normals.
-fn segment(shape: &Shape<'_>, points: &[[f64; 2]], i: usize) -> Primitive {
-    let (n, count) = (points.len(), segments(shape));
-    let ends = |i: usize| (Vec2::from(points[i]), Vec2::from(points[(i + 1) % n]));
-    let normal = |i: usize| {
-        let (a, b) = ends(i);
-        let d = b - a;
-        Vec2::new(d.y, -d.x) / length(d)
-    };
-    let between = |i: usize, j: usize| {
-        let sum = normal(i) + normal(j);
-        let size = length(sum);
-        if size > 1e-9 { sum / size } else { normal(i) }
-    };
-    let closed = count == n;
-    let before = if i > 0 { i - 1 } else { if closed { n - 1 } else { 0 } };
-    let after = if i + 1 < count { i + 1 } else { if closed { 0 } else { i } };
-    let (a, b) = ends(i);
-    Primitive {
-        a: a.to_array(),
-        b: b.to_array(),
-        normal: normal(i).to_array(),
-        start_normal: between(before, i).to_array(),
-        end_normal: between(i, after).to_array(),
-        ..Primitive::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stencils_reproduce_polynomials() {
-        for order in 1..=MAX_ORDER {
-            for x in [-0.1, 0.0, 0.3, 0.99] {
-                let stencil = Stencil::panel(order, 0, x);
-                for power in 0..order as i32 {
-                    let sum: f64 = stencil.terms().map(|(u, w)| w * NODES[order].at[u].powi(power)).sum();
-                    assert!((sum - x.powi(power)).abs() < 1e-13, "{order} {power} {x}: {sum}");
-                }
-            }
-        }
     }
 }

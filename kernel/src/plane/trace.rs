@@ -141,6 +141,8 @@ pub(crate) struct Chains<'a> {
 
 /// No chain is longer, whatever its reflectances.
 const LONGEST: u32 = 100_000;
+/// No path has more lobes: each is a level of recursion.
+const MOST_LOBES: u32 = 64;
 
 impl Chains<'_> {
     /// Follows a ray and all that its reflections make of it.
@@ -173,7 +175,7 @@ impl Chains<'_> {
         if through == 0.0 || leg.depth >= self.most {
             return None;
         }
-        if through < leg.floor || leg.depth >= LONGEST {
+        if through < leg.floor || leg.depth >= LONGEST || leg.lobes >= MOST_LOBES {
             sink.lost(through);
             return None;
         }

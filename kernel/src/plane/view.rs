@@ -70,6 +70,15 @@ impl<'m> Scratch<'m> {
         })
     }
 
+    /// An error where it has no room for sweeps of this scene with so many cuts.
+    pub(crate) fn check(&self, scene: &PlaneScene<'_>, cuts: usize) -> Result<(), Error> {
+        if self.fits(scene, cuts) { Ok(()) } else { Err(Error::Mismatch { what: "plane scratch" }) }
+    }
+
+    fn fits(&self, scene: &PlaneScene<'_>, cuts: usize) -> bool {
+        Scratch::room(scene, cuts).iter().zip(self.room).all(|(needed, room)| *needed <= room)
+    }
+
     /// One sweep's part, and the rest for the sweeps within; `None` where all levels are under way.
     fn split(&mut self) -> Option<(Scratch<'_>, Scratch<'_>)> {
         let room = self.room;
@@ -83,7 +92,7 @@ impl<'m> Scratch<'m> {
 
 /// The spans that the point `x` on primitive `skip` sees above its normal `n`, in the order of rising sines,
 /// with memory for the sweeps that chains start. `cuts` are directions where spans end besides. `None` where
-/// no memory is left.
+/// no memory is left or it is another scene's.
 pub fn sweep<'s>(
     scene: &PlaneScene<'_>,
     x: Vec2,
@@ -92,6 +101,9 @@ pub fn sweep<'s>(
     cuts: &[Vec2],
     scratch: &'s mut Scratch<'_>,
 ) -> Option<(&'s [Span], Scratch<'s>)> {
+    if !scratch.fits(scene, cuts.len()) {
+        return None;
+    }
     let (mine, rest) = scratch.split()?;
     let mut count = 0;
     for body in scene.bodies() {
@@ -106,14 +118,13 @@ pub fn sweep<'s>(
             }
         }
     }
-    let objects = count > 0;
     for cut in cuts.iter().filter(|cut| cut.dot(n) > 0.0) {
         mine.events[count] = Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 };
         count += 1;
     }
     let events = &mut mine.events[..count];
     events.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
-    let spans = if objects || count > 0 {
+    let spans = if count > 0 {
         walk(scene, x, n, events, mine.active, mine.spans)
     } else {
         mine.spans[0] = Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 };
