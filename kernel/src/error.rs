@@ -167,6 +167,11 @@ pub enum Error {
     CameraFrame {
         field: Field,
     },
+    /// A body of the plane model is no circle or polyline, or has too few elements.
+    Body {
+        body: usize,
+        what: &'static str,
+    },
     /// The stage's inputs were made from another scene.
     Mismatch {
         what: &'static str,
@@ -227,6 +232,7 @@ impl fmt::Display for Error {
             Error::CameraFrame { field } => {
                 write!(f, "{}: coincides with or is parallel to the viewing direction", field.name())
             }
+            Error::Body { body, what } => write!(f, "body {body}: {what}"),
             Error::Mismatch { what } => write!(f, "{what} belongs to another scene"),
             Error::Diverges { row_sum } => {
                 write!(

@@ -22,6 +22,7 @@
 //! | chain | [`chain`] | view | a ray → its radiance, the three terms of eq. (11) |
 //! | image | [`image`] ([`camera`]) | view | rays → pixels |
 //! | signature | [`signature`] | view | rays → radiant intensity, projected area, contrast |
+//! | plane model | [`plane`], all stages in two dimensions | | circles and polylines → image |
 //!
 //! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Over them: [`policy`], what follows from the
 //! tolerance. Beside them: [`form_factor`] and [`quadrature`],
@@ -75,6 +76,7 @@ pub mod light;
 pub mod lobe;
 pub mod math;
 pub mod mirror;
+pub mod plane;
 pub mod policy;
 pub mod qmc;
 pub mod quadrature;

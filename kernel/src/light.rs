@@ -7,7 +7,7 @@ use crate::bvh::Bvh;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
-use crate::math::{PI, Vec3};
+use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{MAX_BANDS, Scene};
@@ -42,6 +42,24 @@ impl Light<'_> {
         for (band, o) in out.iter_mut().enumerate().filter(|(_, o)| **o == 0.0) {
             *o = scene.largest_emission(band);
         }
+    }
+
+    /// Root mean square of the sky's radiance over all directions in each band, from 4,096 of them: to some percent
+    /// but where a bright spot fills less than a thousandth of the sphere.
+    pub fn rms_radiance(&self, out: &mut [f64]) {
+        out.fill(0.0);
+        let Some(sky) = &self.sky else { return };
+        let (points, sequence) = (4096, Sequence::new(0x5e1f_0000));
+        let mut radiance = [0.0; MAX_BANDS];
+        let radiance = &mut radiance[..out.len().min(MAX_BANDS)];
+        for index in 0..points {
+            let (u, v) = sequence.pair(index, 0);
+            let (z, (sin, cos)) = (2.0 * u - 1.0, (sin(TAU * v), cos(TAU * v)));
+            let r = sqrt(1.0 - z * z);
+            sky.radiance(Vec3::new(r * cos, r * sin, z), radiance);
+            out.iter_mut().zip(radiance.iter()).for_each(|(o, l)| *o += l * l);
+        }
+        out.iter_mut().for_each(|o| *o = sqrt(*o / f64::from(points)));
     }
 
     /// The largest radiance that a ray can bring straight from the sky in each band; the sun's disc apart.

@@ -139,13 +139,13 @@ pub fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64]) -> f64 
     relative(largest, reference)
 }
 
-/// What a ray of a row finds where it is not blocked, or where it is: the largest radiance of the sky or the root
-/// mean square of the diffuse radiance over the object's area, relative to the reference.
+/// What a ray of a row finds where it is not blocked, or where it is: the root mean square of the sky's radiance
+/// or of the diffuse radiance over the object's area, relative to the reference.
 pub fn at_stake(system: &System<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
     let bands = reference.len().clamp(1, MAX_BANDS);
     let (mut all, mut squares, mut area) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS], 0.0);
     let (sky, _) = all.split_at_mut(bands);
-    system.light.largest_radiance(sky);
+    system.light.rms_radiance(sky);
     for (unknown, values) in radiance.chunks_exact(bands).enumerate() {
         let facet = system.elements.facet_of(unknown).0;
         let own = system.scene.areas().get(facet).copied().unwrap_or(0.0) * system.elements.share(facet);

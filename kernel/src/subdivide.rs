@@ -1,7 +1,7 @@
-//! How finely each facet is cut: where the share of the hemisphere that is blocked changes over the facet in a
-//! way that no linear function follows, such as where another facet pierces it or stands on it.
+//! How finely each facet is cut: where the share of the hemisphere that is dark (blocked by facets that do
+//! not shine) changes over the facet in a way that no linear function follows, such as where another facet pierces it or stands on it.
 //!
-//! Geometry, materials and tolerance decide, never the light.
+//! Geometry, materials and tolerance decide, never sky and sun.
 
 use crate::bvh::Bvh;
 use crate::element::MAX_DIVISIONS;
@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::math::{Vec3, frame};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::ray::Ray;
 use crate::scene::Scene;
 use core::ops::Range;
 
@@ -38,7 +39,8 @@ pub fn probe(
     if out.len() != range.len() {
         return Err(Error::Length { what: "unevenness", expected: range.len(), given: out.len() });
     }
-    let mut probe = Probe { scene, bvh, rays: rays.clamp(1, MOST_RAYS), traced: 0 };
+    let shining = (0..scene.bands()).any(|band| scene.largest_emission(band) > 0.0);
+    let mut probe = Probe { scene, bvh, rays: rays.clamp(1, MOST_RAYS), shining, traced: 0 };
     for (facet, value) in range.zip(out) {
         *value = 0.0;
         let dark = scene.diffuse(scene.material(facet)).iter().all(|&d| d == 0.0);
@@ -59,11 +61,24 @@ struct Probe<'a> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh<'a>,
     rays: u32,
+    /// Whether some facets shine by themselves.
+    shining: bool,
     traced: u64,
 }
 
 impl Probe<'_> {
-    /// Unevenness of the share of the hemisphere that is blocked over one side of a facet.
+    /// Whether a ray brings neither light from outside nor from a facet that shines by itself.
+    #[inline]
+    fn dark(&self, ray: &Ray) -> bool {
+        if !self.shining {
+            return self.bvh.occluded(ray);
+        }
+        let Some(hit) = self.bvh.closest(ray) else { return false };
+        let surface = Surface::of_hit(self.scene, &hit);
+        surface.is_none_or(|s| self.scene.emission(s.material).iter().all(|&l| l == 0.0))
+    }
+
+    /// Unevenness of the share of the hemisphere that is dark over one side of a facet.
     fn side(&mut self, facet: usize, side: usize) -> f64 {
         let mut blocked = [0u32; BINS];
         let (x, y) = frame(self.scene.side_normal(facet, side));
@@ -78,7 +93,7 @@ impl Probe<'_> {
                 let (p, q) = sequence.pair(at, 0);
                 let (dx, dy, dz) = cosine_direction(p, q);
                 let direction: Vec3 = x * dx + y * dy + origin.normal * dz;
-                *count += u32::from(self.bvh.occluded(&origin.leave(direction)));
+                *count += u32::from(self.dark(&origin.leave(direction)));
             }
             self.traced += BINS as u64;
             if index + 1 == self.rays / 4 && unevenness(&blocked, self.rays / 4, SUSPECT) == 0.0 {

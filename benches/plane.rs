@@ -1,0 +1,67 @@
+//! The plane model of the paper's validation on one thread: two circles, distance 2.5, uniform sky, 1,000 samples.
+//!
+//! A run is everything: scene, coupling, solution, image. Errors are printed beside the times, measured against the
+//! reference solver. `cargo bench --bench plane`
+
+#[path = "../tests/support/plane_kernel.rs"]
+mod plane_kernel;
+#[allow(dead_code)]
+#[path = "../tests/support/plane_reference/mod.rs"]
+mod plane_reference;
+
+use blik_kernel::plane::host::Settings;
+use blik_kernel::plane::rows::Method;
+use blik_kernel::plane::scene::{Basis, RaySet};
+use criterion::{Criterion, criterion_group, criterion_main};
+use plane_kernel::{SAMPLES, eps, image, method, pair, solve, uniform, view};
+use plane_reference::diffuse::{Resolution, Solution};
+use plane_reference::gloss::Gloss;
+use std::hint::black_box;
+
+/// Diffuse surfaces and ideal mirrors: the kernel's own method at two tolerances, and the study's method H.
+fn diffuse_mirror(c: &mut Criterion) {
+    let mut group = c.benchmark_group("plane_diffuse_mirror");
+    for (rd, rs) in [(0.4, 0.0), (0.2, 0.2), (0.2, 0.6)] {
+        let scene = pair(2.5, rd, rs, None);
+        let truth = Solution::new(&scene, &|_| 1.0, &[], None, Resolution::FINEST).image(0.0, SAMPLES);
+        let runs = [
+            ("1e-4", Settings::for_tolerance(1e-4), 12),
+            ("1e-5", Settings::for_tolerance(1e-5), 16),
+            ("H128", method('H'), 128),
+        ];
+        for (name, settings, elements) in runs {
+            let run = || image(&scene, elements, &settings, &uniform(), 0.0);
+            println!("rho_d {rd}, rho_s {rs}, {name}: eps {:.1e}", eps(&run(), &truth));
+            group.bench_function(format!("{rd}_{rs}/{name}"), |b| b.iter(|| black_box(run())));
+        }
+    }
+    group.finish();
+}
+
+/// Lobes of rho_0 = 0.8, four reflections at most: the paper's three rays, three Gauss rays, and sets by tolerance.
+fn gloss(c: &mut Criterion) {
+    let mut group = c.benchmark_group("plane_gloss");
+    let (basis, method) = (Basis::Constant, Method::Facets { chains: 0 });
+    let settings = Settings { basis, method, max_bounces: Some(4), cutoff: 1e-9, solver: 1e-9 };
+    for ratio in [50.0, 10.0, 3.0] {
+        let scene = pair(2.5, 0.0, 0.8, Some(ratio));
+        let truth = Gloss::new(&scene, (1.0, None), 4, &[48, 24, 16], 1).symmetric_image(SAMPLES, 4);
+        let lobe = blik_kernel::plane::lobe::PlaneLobe::new(ratio).expect("a ratio above 1");
+        let paper = RaySet::Paper { spacing: lobe.equivalent_width(1.0), renormalised: false };
+        let sets = [
+            ("paper_3", paper),
+            ("gauss_3", RaySet::Gauss([3, 3, 1])),
+            ("1e-2", RaySet::for_tolerance(1e-2, ratio)),
+            ("2e-3", RaySet::for_tolerance(2e-3, ratio)),
+        ];
+        for (name, set) in sets {
+            let run = || solve(&scene, 1, set, &uniform(), &settings, |s, _, scratch| view(s, 0.0, scratch));
+            println!("T0 {ratio}, {name}: eps {:.1e}", eps(&run(), &truth));
+            group.bench_function(format!("T{ratio}/{name}"), |b| b.iter(|| black_box(run())));
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, diffuse_mirror, gloss);
+criterion_main!(benches);

@@ -1,0 +1,105 @@
+//! Solves eq. (12) for the diffuse radiance of all unknowns, by the sweeps of [`crate::radiosity`]: rows are
+//! independent, so that any split gives the same bits, and the change of a sweep bounds the error.
+
+use crate::error::Error;
+use crate::math::fabs;
+use crate::plane::scene::PlaneScene;
+pub use crate::radiosity::{bound, sweeps};
+use core::ops::Range;
+
+/// Everything that stays fixed while the system is solved.
+#[derive(Clone, Copy, Debug)]
+pub struct System<'a> {
+    scene: &'a PlaneScene<'a>,
+    matrix: &'a [f64],
+    direct: &'a [f64],
+    unknowns: usize,
+    classes: usize,
+}
+
+impl<'a> System<'a> {
+    /// Joins all rows ([`crate::plane::rows::fill`]) and their light ([`crate::plane::light::fill`]).
+    ///
+    /// # Errors
+    /// [`Error::Length`] where they do not fit the scene and one another.
+    pub fn new(scene: &'a PlaneScene<'a>, matrix: &'a [f64], direct: &'a [f64]) -> Result<System<'a>, Error> {
+        let unknowns = scene.unknowns();
+        let classes = direct.len() / unknowns.max(1);
+        for (what, expected, given) in [
+            ("plane light", unknowns * classes.max(1), direct.len()),
+            ("plane matrix", unknowns.saturating_mul(unknowns * classes), matrix.len()),
+        ] {
+            if expected != given {
+                return Err(Error::Length { what, expected, given });
+            }
+        }
+        Ok(System { scene, matrix, direct, unknowns, classes })
+    }
+
+    /// Levels of the solution: one where all reflections count, else one for each number that may.
+    pub fn levels(&self) -> usize {
+        self.classes
+    }
+
+    /// The largest of rho_d times the absolute sum of a row, over the rows of `range`: the contraction of a
+    /// sweep.
+    pub fn contraction(&self, range: Range<usize>) -> f64 {
+        let row = |unknown| {
+            let sum: f64 = self.part(unknown, 0).iter().map(|&x| fabs(x)).sum();
+            self.diffuse(unknown) * sum
+        };
+        range.map(row).fold(0.0, f64::max)
+    }
+
+    /// One sweep over the rows of `range`, where all reflections count: from the radiances of all unknowns
+    /// those of the range. Returns the largest change.
+    pub fn sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64]) -> f64 {
+        let mut change = 0.0;
+        for (unknown, out) in range.zip(to) {
+            let direct = self.direct.get(unknown * self.classes).copied().unwrap_or(0.0);
+            *out = self.diffuse(unknown) * (direct + dot(self.part(unknown, 0), from));
+            let old = from.get(unknown).copied().unwrap_or(0.0);
+            change = f64::max(change, fabs(*out - old));
+        }
+        change
+    }
+
+    /// Radiances of the unknowns of `range` from light reflected at most `bounces` times (1 to
+    /// [`System::levels`]), given `lower`: those of all unknowns for 1, 2, ... reflections, one after the
+    /// other.
+    pub fn level(&self, range: Range<usize>, bounces: usize, lower: &[f64], to: &mut [f64]) {
+        for (unknown, out) in range.zip(to) {
+            let direct = self.direct.iter().skip(unknown * self.classes).take(bounces.min(self.classes));
+            let mut sum: f64 = direct.sum();
+            for class in 0..bounces.min(self.classes).saturating_sub(1) {
+                let level = bounces - 2 - class;
+                let from = lower.get(level * self.unknowns..(level + 1) * self.unknowns).unwrap_or(&[]);
+                sum += dot(self.part(unknown, class), from);
+            }
+            *out = self.diffuse(unknown) * sum;
+        }
+    }
+
+    fn part(&self, unknown: usize, class: usize) -> &'a [f64] {
+        let at = (unknown * self.classes + class) * self.unknowns;
+        self.matrix.get(at..at + self.unknowns).unwrap_or(&[])
+    }
+
+    fn diffuse(&self, unknown: usize) -> f64 {
+        let (primitive, _) = self.scene.unknown(unknown);
+        self.scene.primitives().get(primitive).map_or(0.0, |p| self.scene.diffuse(p.material))
+    }
+}
+
+/// Scalar product in four lanes.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (a, b) in a4.zip(b4) {
+        for (lane, (x, y)) in lanes.iter_mut().zip(a.iter().zip(b)) {
+            *lane += x * y;
+        }
+    }
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+}

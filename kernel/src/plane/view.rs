@@ -1,0 +1,238 @@
+//! What a point sees: the half circle above a surface, cut at every silhouette, each span with its first hit.
+
+use crate::arena::{Arena, Need, plain_struct};
+use crate::error::Error;
+use crate::math::sqrt;
+use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
+use crate::plane::{Vec2, cross, length, toward};
+
+plain_struct! {
+    /// A part of the half circle: directions whose sines to the normal are from `from` to `to`.
+    pub struct Span {
+        /// Lower sine.
+        pub from: f64,
+        /// Upper sine.
+        pub to: f64,
+        /// First hit, or [`NOWHERE`] for the sky.
+        pub primitive: u32,
+        /// Keeps the size a multiple of eight.
+        pub unused: u32,
+    }
+}
+
+plain_struct! {
+    /// A silhouette.
+    pub struct Event {
+        /// Sine of its direction.
+        pub at: f64,
+        /// What begins or ends, or [`NOWHERE`] for a mere cut.
+        pub primitive: u32,
+        /// 1 where it begins.
+        pub begins: u32,
+    }
+}
+
+/// Sweeps that can be under way at once: of a row, and of the lobes of a path.
+pub const LEVELS: usize = 4;
+
+/// Working memory of sweeps.
+#[derive(Debug)]
+pub struct Scratch<'m> {
+    events: &'m mut [Event],
+    active: &'m mut [u32],
+    spans: &'m mut [Span],
+    /// Entries of one sweep in `events`, `active` and `spans`.
+    room: [usize; 3],
+}
+
+impl<'m> Scratch<'m> {
+    fn room(scene: &PlaneScene<'_>, cuts: usize) -> [usize; 3] {
+        let primitives = scene.primitives().len();
+        let events = 2 * primitives + cuts;
+        [events, primitives, events + 1]
+    }
+
+    /// Bytes for sweeps of a scene with at most `cuts` further cuts.
+    pub fn bytes(scene: &PlaneScene<'_>, cuts: usize) -> Result<usize, Error> {
+        let [events, active, spans] = Scratch::room(scene, cuts).map(|n| n.saturating_mul(LEVELS));
+        Need::new().and::<Event>(events).and::<u32>(active).and::<Span>(spans).bytes()
+    }
+
+    /// Working memory in the caller's.
+    pub fn new(scene: &PlaneScene<'_>, cuts: usize, memory: &'m mut [u8]) -> Result<Scratch<'m>, Error> {
+        let mut arena = Arena::new(memory, Scratch::bytes(scene, cuts)?)?;
+        let room = Scratch::room(scene, cuts);
+        Ok(Scratch {
+            events: arena.take(room[0] * LEVELS)?,
+            active: arena.take(room[1] * LEVELS)?,
+            spans: arena.take(room[2] * LEVELS)?,
+            room,
+        })
+    }
+
+    /// An error where it has no room for sweeps of this scene with so many cuts.
+    pub(crate) fn check(&self, scene: &PlaneScene<'_>, cuts: usize) -> Result<(), Error> {
+        if self.fits(scene, cuts) { Ok(()) } else { Err(Error::Mismatch { what: "plane scratch" }) }
+    }
+
+    fn fits(&self, scene: &PlaneScene<'_>, cuts: usize) -> bool {
+        Scratch::room(scene, cuts).iter().zip(self.room).all(|(needed, room)| *needed <= room)
+    }
+
+    /// One sweep's part, and the rest for the sweeps within; `None` where all levels are under way.
+    fn split(&mut self) -> Option<(Scratch<'_>, Scratch<'_>)> {
+        let room = self.room;
+        let (events, more_events) = self.events.split_at_mut_checked(room[0])?;
+        let (active, more_active) = self.active.split_at_mut_checked(room[1])?;
+        let (spans, more_spans) = self.spans.split_at_mut_checked(room[2])?;
+        let rest = Scratch { events: more_events, active: more_active, spans: more_spans, room };
+        Some((Scratch { events, active, spans, room }, rest))
+    }
+}
+
+/// The spans that the point `x` on primitive `skip` sees above its normal `n`, in the order of rising sines,
+/// with memory for the sweeps that chains start. `cuts` are directions where spans end besides. `None` where
+/// no memory is left or it is another scene's.
+pub fn sweep<'s>(
+    scene: &PlaneScene<'_>,
+    x: Vec2,
+    n: Vec2,
+    skip: u32,
+    cuts: &[Vec2],
+    scratch: &'s mut Scratch<'_>,
+) -> Option<(&'s [Span], Scratch<'s>)> {
+    if !scratch.fits(scene, cuts.len()) {
+        return None;
+    }
+    let (mine, rest) = scratch.split()?;
+    let mut count = 0;
+    for body in scene.bodies() {
+        for index in body.first..body.first + body.count {
+            let Some(p) = scene.primitives().get(index as usize).filter(|_| index != skip) else { continue };
+            if let Some((from, to)) = extent(p, x, n, body.closed == 1)
+                && to > from
+            {
+                mine.events[count] = Event { at: from, primitive: index, begins: 1 };
+                mine.events[count + 1] = Event { at: to, primitive: index, begins: 0 };
+                count += 2;
+            }
+        }
+    }
+    for cut in cuts.iter().filter(|cut| cut.dot(n) > 0.0) {
+        mine.events[count] = Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 };
+        count += 1;
+    }
+    let events = &mut mine.events[..count];
+    events.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
+    let spans = if count > 0 {
+        walk(scene, x, n, events, mine.active, mine.spans)
+    } else {
+        mine.spans[0] = Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 };
+        1
+    };
+    Some((&mine.spans[..spans], rest))
+}
+
+/// Walks from silhouette to silhouette and keeps what begins and ends.
+fn walk(
+    scene: &PlaneScene<'_>,
+    x: Vec2,
+    n: Vec2,
+    events: &[Event],
+    active: &mut [u32],
+    spans: &mut [Span],
+) -> usize {
+    let (mut live, mut count, mut from) = (0, 0, -1.0);
+    let end = Event { at: 1.0, primitive: NOWHERE, begins: 0 };
+    for event in events.iter().chain(core::iter::once(&end)) {
+        let to = event.at.clamp(-1.0, 1.0);
+        if to - from > 1e-15 {
+            let primitive = nearest(scene, x, toward(n, 0.5 * (from + to)), &active[..live]);
+            spans[count] = Span { from, to, primitive, unused: 0 };
+            count += 1;
+            from = to;
+        }
+        if event.primitive == NOWHERE {
+            continue;
+        }
+        if event.begins == 1 {
+            active[live] = event.primitive;
+            live += 1;
+        } else if let Some(at) = active[..live].iter().position(|&p| p == event.primitive) {
+            active.swap(at, live - 1);
+            live -= 1;
+        }
+    }
+    count
+}
+
+/// The first hit among the primitives that a direction between silhouettes meets.
+fn nearest(scene: &PlaneScene<'_>, x: Vec2, d: Vec2, active: &[u32]) -> u32 {
+    if let [only] = active {
+        return *only;
+    }
+    let (mut best, mut least) = (NOWHERE, f64::INFINITY);
+    for &index in active {
+        if let Some(p) = scene.primitives().get(index as usize) {
+            let t = distance(p, x, d);
+            if t < least || (t == least && index < best) {
+                (best, least) = (index, t);
+            }
+        }
+    }
+    best
+}
+
+/// Distance along the ray to a primitive that the ray meets, but for rounding.
+pub(crate) fn distance(p: &Primitive, x: Vec2, d: Vec2) -> f64 {
+    let a = Vec2::from(p.a) - x;
+    if p.kind == 0 {
+        let along = a.dot(d);
+        let off = a - d * along;
+        return along - sqrt((p.b[0] * p.b[0] - off.dot(off)).max(0.0));
+    }
+    let b = Vec2::from(p.b) - x;
+    let (ca, cb) = (cross(d, a), cross(d, b));
+    let span = ca - cb;
+    let t = if span == 0.0 { 0.5 } else { (ca / span).clamp(0.0, 1.0) };
+    (a + (b - a) * t).dot(d)
+}
+
+/// Sines between which a primitive lies above the horizon of `x`, if any of it does and its front may be seen.
+fn extent(p: &Primitive, x: Vec2, n: Vec2, closed: bool) -> Option<(f64, f64)> {
+    let a = Vec2::from(p.a) - x;
+    if p.kind == 0 {
+        let (away, radius) = (length(a), p.b[0]);
+        if a.dot(n) <= -radius {
+            return None;
+        }
+        let sine = (radius / away).min(1.0);
+        let cosine = sqrt((1.0 - sine) * (1.0 + sine));
+        let axis = a / away;
+        let side = Vec2::new(-axis.y, axis.x) * sine;
+        let (left, right) = (axis * cosine + side, axis * cosine - side);
+        let (up, down) = (left.dot(n) > 0.0, right.dot(n) > 0.0);
+        if !up && !down {
+            return None;
+        }
+        let from = if down { cross(n, right) } else { -1.0 };
+        let to = if up { cross(n, left) } else { 1.0 };
+        return Some((from.clamp(-1.0, 1.0), to.clamp(-1.0, 1.0)));
+    }
+    let b = Vec2::from(p.b) - x;
+    let facing = -a.dot(Vec2::from(p.normal));
+    if closed && facing <= 0.0 {
+        return None;
+    }
+    let (ya, yb) = (a.dot(n), b.dot(n));
+    if ya <= 0.0 && yb <= 0.0 {
+        return None;
+    }
+    let (xa, xb) = (cross(n, a), cross(n, b));
+    // where the segment dips below the horizon: the side on which it does
+    let side = |x: f64| if x < 0.0 { -1.0 } else { 1.0 };
+    let horizon = || side((xa * yb - xb * ya) * (yb - ya));
+    let from_a = if ya > 0.0 { xa / length(a) } else { horizon() };
+    let from_b = if yb > 0.0 { xb / length(b) } else { horizon() };
+    Some((from_a.min(from_b), from_a.max(from_b)))
+}
