@@ -4,6 +4,7 @@
 //! Rows of unknowns are computed by [`rows::fill`] into blocks of caller memory, each block a range of rows;
 //! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
 
+pub mod pack;
 pub mod rows;
 pub mod sink;
 pub mod word;
@@ -261,6 +262,11 @@ impl<'m> Coupling<'m> {
             return Err(Error::Mismatch { what: "coupling block" });
         }
         Ok(Coupling { blocks, unknowns })
+    }
+
+    /// Blocks that cover any one range of rows, in order.
+    pub fn part(blocks: &'m [Block<'m>]) -> Coupling<'m> {
+        Coupling { blocks, unknowns: blocks.last().map_or(0, |b| b.range().end) }
     }
 
     /// Number of rows.

@@ -67,6 +67,7 @@ pub mod chain;
 pub mod coupling;
 pub mod element;
 pub mod error;
+pub mod facets;
 pub mod form_factor;
 #[cfg(feature = "std")]
 pub mod host;
