@@ -29,8 +29,9 @@ pub struct blik_coupling {
 impl Handle for blik_coupling {
     const TAG: usize = 0x5ce9_e002;
 
-    fn tag(&mut self) -> &mut usize {
-        &mut self.tag
+    fn tag(at: *mut Self) -> *mut usize {
+        // SAFETY: only the place is computed, within memory of a handle's size.
+        unsafe { &raw mut (*at).tag }
     }
 
     #[cfg(feature = "std")]

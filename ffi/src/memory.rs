@@ -14,8 +14,8 @@ pub(crate) const fn head<T>() -> usize {
 pub(crate) trait Handle {
     /// Tells its kind; 0 stands for none.
     const TAG: usize;
-    /// The tag that it carries.
-    fn tag(&mut self) -> &mut usize;
+    /// Where its tag stands; `at` points to memory of its size.
+    fn tag(at: *mut Self) -> *mut usize;
     /// Memory of the library's own in which it stands, if any.
     #[cfg(feature = "std")]
     fn owner(&mut self) -> &mut Option<std::boxed::Box<Owned>>;
@@ -36,8 +36,8 @@ pub(crate) unsafe fn object<'a, T: Handle>(at: *const T) -> Result<&'a T, blik_e
     if !at.is_aligned() {
         return Err(blik_error::of(BLIK_ERROR_HANDLE));
     }
-    // SAFETY: aligned; the tag is the first member of every handle.
-    if unsafe { at.cast::<usize>().read() } != T::TAG {
+    // SAFETY: aligned, and within memory of a handle's size.
+    if unsafe { T::tag(at.cast_mut()).read() } != T::TAG {
         return Err(blik_error::of(BLIK_ERROR_HANDLE));
     }
     // SAFETY: a handle of this kind, by its tag.
@@ -130,10 +130,10 @@ pub(crate) unsafe fn end<T: Handle>(at: *mut T) {
         return;
     }
     // SAFETY: a handle, and nobody else uses it.
-    let handle = unsafe { &mut *at };
-    *handle.tag() = 0;
+    unsafe { T::tag(at).write(0) };
     #[cfg(feature = "std")]
-    drop(handle.owner().take());
+    // SAFETY: as above.
+    drop(unsafe { &mut *at }.owner().take());
 }
 
 /// Zeroed memory of the system, aligned to [`ALIGNMENT`], freed when dropped.

@@ -50,8 +50,9 @@ pub(crate) struct Tables {
 impl Handle for blik_solution {
     const TAG: usize = 0x5ce9_e003;
 
-    fn tag(&mut self) -> &mut usize {
-        &mut self.tag
+    fn tag(at: *mut Self) -> *mut usize {
+        // SAFETY: only the place is computed, within memory of a handle's size.
+        unsafe { &raw mut (*at).tag }
     }
 
     #[cfg(feature = "std")]
