@@ -16,7 +16,7 @@ pub fn side(
     irradiance: &mut [f64],
     radiance: &mut [f64],
 ) {
-    let (scene, shape, last) = (solved.scene, solved.shape, solved.shape.levels - 1);
+    let (scene, shape, last) = (solved.scene, solved.shape, solved.shape.levels.saturating_sub(1));
     irradiance.fill(0.0);
     radiance.fill(0.0);
     if scene.areas().get(facet).is_none_or(|area| *area == 0.0) {

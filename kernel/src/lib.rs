@@ -72,6 +72,7 @@ pub mod form_factor;
 #[cfg(feature = "std")]
 pub mod host;
 pub mod image;
+mod index;
 pub mod light;
 pub mod lobe;
 pub mod math;
@@ -85,6 +86,7 @@ pub mod scene;
 pub mod signature;
 pub mod simd;
 pub mod sky;
+mod sort;
 pub mod subdivide;
 pub mod sun;
 

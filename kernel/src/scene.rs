@@ -9,6 +9,7 @@ mod input;
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
+use crate::index::Index;
 use crate::math::{Vec3, sqrt, unit};
 
 pub use input::*;
@@ -171,13 +172,13 @@ impl<'m> Scene<'m> {
 
     /// Area of a facet in the caller's units.
     pub fn area(&self, facet: usize) -> f64 {
-        self.areas[facet] / (self.scale * self.scale)
+        self.areas.at(facet) / (self.scale * self.scale)
     }
 
     /// Unit normal of a side of a facet (side 0 front, 1 back).
     #[inline(always)]
     pub fn side_normal(&self, facet: usize, side: usize) -> Vec3 {
-        if side == 0 { self.normals[facet] } else { -self.normals[facet] }
+        if side == 0 { self.normals.at(facet) } else { -self.normals.at(facet) }
     }
 
     /// Normal for the mirror direction at the point of barycentric weights `u`, `v` (corners 1 and 2) of a side.
@@ -201,7 +202,7 @@ impl<'m> Scene<'m> {
     /// Index of a facet's material.
     #[inline(always)]
     pub fn material(&self, facet: usize) -> usize {
-        self.materials[facet] as usize
+        self.materials.at(facet) as usize
     }
 
     /// Number of materials.
@@ -209,40 +210,45 @@ impl<'m> Scene<'m> {
         self.mirror.len()
     }
 
+    #[inline(always)]
+    fn values(&self, table: &'m [f64], material: usize) -> &'m [f64] {
+        table.part(material * self.bands..(material + 1) * self.bands)
+    }
+
     /// Diffuse reflectance of a material, one value per band.
     #[inline(always)]
     pub fn diffuse(&self, material: usize) -> &'m [f64] {
-        &self.diffuse[material * self.bands..(material + 1) * self.bands]
+        self.values(self.diffuse, material)
     }
 
     /// Mirror reflectance of a material, one value per band.
     #[inline(always)]
     pub fn specular(&self, material: usize) -> &'m [f64] {
-        &self.specular[material * self.bands..(material + 1) * self.bands]
+        self.values(self.specular, material)
     }
 
     /// Own diffuse radiance of a material, one value per band.
     #[inline(always)]
     pub fn emission(&self, material: usize) -> &'m [f64] {
-        &self.emission[material * self.bands..(material + 1) * self.bands]
+        self.values(self.emission, material)
     }
 
     /// Mirror class of a material: the index of the first material with the same mirror, or [`NO_MIRROR`].
     #[inline(always)]
     pub fn mirror(&self, material: usize) -> u32 {
-        self.mirror[material]
+        self.mirror.get(material).copied().unwrap_or(NO_MIRROR)
     }
 
     /// Axis ratio of a material's lobe, or `None` for an ideal mirror.
     #[inline(always)]
     pub fn gloss(&self, material: usize) -> Option<f64> {
-        let ratio = self.gloss_ratio[material];
+        let ratio = self.gloss_ratio.at(material);
         if ratio > 0.0 { Some(ratio) } else { None }
     }
 
     /// Rays that a material asks for at the first hit of its lobe; `None`: by tolerance.
     pub fn gloss_rays(&self, material: usize) -> Option<u32> {
-        match self.gloss_rays[material] {
+        match self.gloss_rays.at(material) {
             0 => None,
             n => Some(n),
         }
@@ -265,7 +271,11 @@ impl<'m> Scene<'m> {
 
     /// Largest emission of the scene in one band.
     pub fn largest_emission(&self, band: usize) -> f64 {
-        self.emission.iter().skip(band).step_by(self.bands).fold(0.0, |a, &b| if b > a { b } else { a })
+        self.emission
+            .iter()
+            .skip(band)
+            .step_by(self.bands.max(1))
+            .fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
     /// A point of the caller's coordinates in scene coordinates.
