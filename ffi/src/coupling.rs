@@ -290,11 +290,11 @@ impl Filler<'_> {
                 true
             })
         };
-        let part = (self.size - self.end) / lanes & !(ALIGNMENT - 1);
+        let part = (self.size - self.end) / lanes.max(1) & !(ALIGNMENT - 1);
         let this = &*self;
         // every lane is one item, so that its region has one owner
         runner.each(lanes, lanes, share, &|_, lane| {
-            let cut = |i: usize| gap.start + gap.len() * i / lanes;
+            let cut = |i: usize| gap.start + gap.len() * i / lanes.max(1);
             let start = this.end + lane * part;
             Ok(this.lane(cut(lane)..cut(lane + 1), start..start + part, &note)?)
         })?;

@@ -6,6 +6,7 @@
 // the names of C
 #![allow(non_camel_case_types)]
 
+mod bake;
 mod coupling;
 mod form_factor;
 mod memory;
@@ -18,6 +19,7 @@ mod status;
 mod types;
 mod view;
 
+pub use bake::*;
 pub use coupling::*;
 pub use form_factor::*;
 pub use report::*;

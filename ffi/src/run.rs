@@ -181,7 +181,7 @@ impl Runner {
         let stride = stride.max(1);
         let rows = out.len() / stride;
         let lanes = self.lanes();
-        let piece = rows.div_ceil(16 * lanes).clamp(16, 4096);
+        let piece = rows.div_ceil((16 * lanes).max(1)).clamp(16, 4096);
         let start = Start(out.as_mut_ptr());
         self.each(rows.div_ceil(piece), lanes, share, &|_, item| {
             let range = item * piece..((item + 1) * piece).min(rows);
@@ -201,7 +201,7 @@ impl Runner {
         work: impl Fn(Range<usize>) -> Result<(), Error> + Sync,
     ) -> Result<(), blik_error> {
         let lanes = self.lanes();
-        let piece = rows.div_ceil(16 * lanes).clamp(16, 4096);
+        let piece = rows.div_ceil((16 * lanes).max(1)).clamp(16, 4096);
         self.each(rows.div_ceil(piece), lanes, share, &|_, item| {
             Ok(work(item * piece..((item + 1) * piece).min(rows))?)
         })

@@ -25,6 +25,8 @@ pub struct blik_solution {
     tag: usize,
     pub(crate) coupling: &'static blik_coupling,
     pub(crate) light: Light<'static>,
+    /// What the light was made from.
+    pub(crate) input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
     pub(crate) tables: Tables,
     pub(crate) shape: Shape,
     #[cfg(feature = "std")]
@@ -65,6 +67,7 @@ impl blik_solution {
     pub(crate) fn new(
         coupling: &'static blik_coupling,
         light: Light<'static>,
+        input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
         tables: Tables,
         shape: Shape,
     ) -> blik_solution {
@@ -72,6 +75,7 @@ impl blik_solution {
             tag: blik_solution::TAG,
             coupling,
             light,
+            input,
             tables,
             shape,
             #[cfg(feature = "std")]
@@ -355,7 +359,7 @@ fn build(
         bytes: sizes.kept().bytes()?,
     };
     // SAFETY: `place` made room for it.
-    unsafe { place.write(blik_solution::new(coupling, light, tables, shape)) };
+    unsafe { place.write(blik_solution::new(coupling, light, (given.sky, given.sun), tables, shape)) };
     Ok(place.as_ptr())
 }
 
@@ -426,12 +430,12 @@ impl Shine<'_> {
         let (scene, rows) = (&base.scene, base.scene.facets() * base.scene.sides());
         let piece = rows.div_ceil(256).clamp(16, 1024);
         let usual = sink::bytes(piece, 64, 2 * beam::most_rays(scene, settings), scene.bands())?;
-        let mut lanes = runner.lanes().min(scratch.len() / usual).max(1);
+        let mut lanes = runner.lanes().min(scratch.len() / usual.max(1)).max(1);
         let (mut next, mut traced) = (0, 0);
         let size = scratch.len();
         let start = Start(scratch.as_mut_ptr());
         while next < rows {
-            let part = size / lanes & !(ALIGNMENT - 1);
+            let part = size / lanes.max(1) & !(ALIGNMENT - 1);
             let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
             let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
             let mut done = [0; MOST_LANES];

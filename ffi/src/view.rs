@@ -239,7 +239,7 @@ fn paint(
 ) -> Result<Tally, blik_error> {
     let (rows, bands) = (camera.rows(), solution.shape.bands);
     let (fixed, lane_size) = scratch_parts(camera, bands)?;
-    let lanes = scratch.len().saturating_sub(fixed) / lane_size;
+    let lanes = scratch.len().saturating_sub(fixed) / lane_size.max(1);
     if lanes == 0 {
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(fixed + lane_size, scratch.len()));
     }

@@ -3,6 +3,8 @@
 //! The cut depends on geometry, materials and tolerance, never on the light. An unknown of the linear system
 //! is one side of one element: unknown = element * sides + side.
 
+mod bake;
+
 use crate::arena::{Arena, Need};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};

@@ -60,6 +60,7 @@
 #![deny(unsafe_code)]
 
 pub mod arena;
+pub mod bake;
 pub mod beam;
 pub mod bvh;
 pub mod camera;

@@ -4,6 +4,7 @@
 //! that the box fits into [-1, 1]. Moving subtracts the box's lowest corner first: a shift of all vertices by
 //! exactly representable amounts leaves the scene coordinates bit-identical.
 
+pub(crate) mod bake;
 mod check;
 mod input;
 

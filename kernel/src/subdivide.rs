@@ -149,7 +149,8 @@ pub fn divisions(
             return Err(Error::Length { what: "divisions", expected: scene.facets(), given });
         }
     }
-    let total: f64 = scene.areas().iter().sum();
+    // where all facets are degenerate nothing is cut
+    let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let root = |facet: usize| {
         let rho = scene.diffuse(scene.material(facet)).iter().fold(0.0, |a: f64, &b| a.max(b));
         libm::cbrt(scene.areas()[facet] / total * unevenness[facet] * rho * rho)

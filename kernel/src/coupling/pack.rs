@@ -4,6 +4,7 @@ use super::word::Word;
 use super::{Head, Record, Row};
 use crate::arena::{ALIGNMENT, Arena, View};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 
 /// Bytes of a block of so many rows, words and records without room to spare, on a boundary of
 /// [`ALIGNMENT`].
@@ -48,9 +49,19 @@ pub fn pack(memory: &mut [u8]) -> Result<usize, Error> {
     Ok(bytes(rows, words, bands, records))
 }
 
-/// As `copy_within`, in pieces that cannot be out of bounds.
+/// As `copy_within` toward the front, without a way to panic.
 pub fn move_down(memory: &mut [u8], from: usize, to: usize, size: usize) {
-    if to < from && from.checked_add(size).is_some_and(|end| end <= memory.len()) {
-        memory.copy_within(from..from + size, to);
+    let Some(part) = memory.get_mut(to..) else { return };
+    let Some(back) = from.checked_sub(to).filter(|back| *back > 0) else { return };
+    // word by word where both start on one: blocks do
+    if back.is_multiple_of(8) && size.is_multiple_of(8) {
+        let (words, _) = part.as_chunks_mut::<8>();
+        for at in 0..size / 8 {
+            words.set(at, words.at(at + back / 8));
+        }
+    } else {
+        for at in 0..size {
+            part.set(at, part.at(at + back));
+        }
     }
 }
