@@ -149,25 +149,29 @@ fn element_bytes(base: &blik_scene, tolerance: f64) -> usize {
     let facets = base.scene.facets();
     let most = subdivide::most_elements(facets, tolerance);
     // first element and divisions of each facet, facet of each element; unevenness and divisions while making them
-    facets.saturating_mul(4 + 4 + 8 + 4).saturating_add(most.saturating_mul(4)).saturating_add(8 * ALIGNMENT)
+    facets
+        .saturating_mul(4 + 4 + 4 + 8 + 4)
+        .saturating_add(most.saturating_mul(4))
+        .saturating_add(8 * ALIGNMENT)
 }
 
-/// How finely each facet is cut, into the front of `scratch`.
+/// How finely each facet is cut, and what decided it, into the front of `scratch`.
 fn divisions<'s>(
     base: &blik_scene,
     settings: &Settings,
     runner: &mut Runner,
     scratch: &'s mut [u8],
-) -> Result<&'s [u32], blik_error> {
+) -> Result<(&'s [u32], &'s [f64]), blik_error> {
     let facets = base.scene.facets();
     let mut arena = blik_kernel::arena::Arena::new(scratch, 0)?;
     let out = arena.take::<u32>(facets)?;
     let unevenness = arena.take::<f64>(facets)?;
+    let probing = policy::probing(&settings.rows(base));
     runner.rows(unevenness, 1, PROBING, |range, out| {
-        subdivide::probe(&base.scene, &base.bvh, range, out).map(|_| ())
+        subdivide::probe(&base.scene, &base.bvh, probing, range, out).map(|_| ())
     })?;
     subdivide::divisions(&base.scene, unevenness, settings.tolerance, out)?;
-    Ok(out)
+    Ok((out, unevenness))
 }
 
 /// Rows of one piece of work: as many pieces as balance two dozen threads, large enough that a block's head does not
@@ -189,13 +193,13 @@ fn elements(
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
     let (_, scratch) = whole.split_at_mut_checked(keep).ok_or(short)?;
-    let divisions = divisions(base, settings, runner, scratch)?;
+    let (divisions, unevenness) = divisions(base, settings, runner, scratch)?;
     let bytes = Elements::bytes(divisions)?.next_multiple_of(ALIGNMENT);
     if bytes > keep {
         return Err(short.sizes(bytes + scratch_bytes, cutter.size));
     }
     let memory = cutter.take(bytes)?;
-    Ok(Elements::new(&base.scene, divisions, memory)?)
+    Ok(Elements::new(&base.scene, divisions, unevenness, memory)?)
 }
 
 /// Where a finished block stands.
@@ -591,10 +595,10 @@ mod owned {
     ) -> Result<*mut blik_coupling, blik_error> {
         let mut scratch = Slab::new(base.scene.facets() * 12 + 4 * ALIGNMENT)?;
         // SAFETY: dropped at the end of this function, after the last use.
-        let divisions = divisions(base, settings, runner, unsafe { scratch.bytes_mut() })?;
+        let (divisions, unevenness) = divisions(base, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(divisions)?)?;
         // SAFETY: the handle owns the slab.
-        let elements = Elements::new(&base.scene, divisions, unsafe { own.bytes_mut() })?;
+        let elements = Elements::new(&base.scene, divisions, unevenness, unsafe { own.bytes_mut() })?;
         let rows = settings.rows(base);
         let (unknowns, piece) = (elements.unknowns(), piece(elements.unknowns()));
         let done = Mutex::new(Vec::new());

@@ -405,7 +405,7 @@ impl Shine<'_> {
         let Some(sun) = &self.light.sun else { return Ok(0) };
         let rays = Turns::new(0u64);
         runner.rows(lit, 1, 0.5 * SHARES[1], |range, out| {
-            let traced = light::sun_rows(&base.scene, &base.bvh, elements, sun, range, out)?;
+            let traced = light::sun_rows(&base.scene, &base.bvh, elements, self.matrix, sun, range, out)?;
             rays.with(|all| *all += traced);
             Ok(())
         })?;
@@ -468,7 +468,7 @@ impl Shine<'_> {
                 let memory = unsafe { core::slice::from_raw_parts(start.at(lane * part), part) };
                 let block = [Block::open(memory)?];
                 let thrown = Coupling::part(&block);
-                beam::add(&thrown, sun, self.shape, direct);
+                beam::add(&thrown, self.matrix, sun, self.shape, direct);
                 let rays = |r: &blik_kernel::coupling::Row| u64::from(r.rays) + u64::from(r.chain_rays);
                 traced +=
                     thrown.rows(wanted.start..wanted.start + done).map(|(_, r)| rays(&r.row)).sum::<u64>();

@@ -485,6 +485,7 @@ pub unsafe extern "C" fn blik_facets(
         // SAFETY: by the caller's promise.
         let solution: &blik_solution = unsafe { object(solution) }?;
         let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
+        let coupling = solution.coupling.matrix()?;
         let (bands, sides) = (solution.shape.bands, scene.sides());
         let range = rows_of(first, count, scene.facets())?;
         let of = |at: *mut f64, size: usize| if at.is_null() { 0 } else { size };
@@ -504,7 +505,7 @@ pub unsafe extern "C" fn blik_facets(
         let [e, l] = values.each_mut().map(|all| all.split_at_mut(bands.min(MAX_BANDS)).0);
         for (at, facet) in range.enumerate() {
             for side in 0..sides {
-                facets::side(&solved, solution.tables.sun, facet, side, e, l);
+                facets::side(&solved, &coupling, solution.tables.sun, facet, side, e, l);
                 let start = (at * sides + side) * bands;
                 irradiance.iter_mut().skip(start).zip(&*e).for_each(|(to, from)| *to = *from);
                 radiance.iter_mut().skip(start).zip(&*l).for_each(|(to, from)| *to = *from);

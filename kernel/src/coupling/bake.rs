@@ -1,7 +1,7 @@
 //! Couplings in baked blocks.
 
 use super::word::{EMPTY, LONGEST, Word};
-use super::{ABSENT, BLOCKED, Block, Head, Record, Row, TRACED};
+use super::{ABSENT, BLOCKED, Block, ENCLOSED, Head, Record, Row};
 use crate::arena::View;
 use crate::bake::Writer;
 use crate::element::Elements;
@@ -89,7 +89,8 @@ impl<'m> Block<'m> {
             // gradients of a share of the hemisphere: 36 times it at most
             (0.0..=1.0 + 1e-6).contains(&r.weight) && r.gradient.iter().all(|g| g.abs() <= 100.0)
         };
-        (ABSENT..=TRACED).contains(&row.state)
+        (ABSENT..=ENCLOSED).contains(&row.state)
+            && (0.0..=1.0).contains(&row.exposed)
             && row.lost >= 0.0
             && row.lost.is_finite()
             && row.spread >= 0.0

@@ -11,7 +11,8 @@ impl<'m> Elements<'m> {
     pub(crate) fn put(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         writer.put(self.divisions)?;
         writer.put(self.first)?;
-        writer.put(self.facet)
+        writer.put(self.facet)?;
+        writer.put(self.roughness)
     }
 
     pub(crate) fn get(view: &mut View<'m>, scene: &Scene<'_>) -> Result<Elements<'m>, Error> {
@@ -22,6 +23,11 @@ impl<'m> Elements<'m> {
         let memory = Elements::bytes(divisions)?;
         let first = view.take::<u32>(divisions.len() + 1)?;
         let facet = view.take::<u32>(super::count(divisions)?)?;
+        let roughness = view.take::<f32>(divisions.len())?;
+        // the root of a variance of shares
+        if roughness.iter().any(|r| !(0.0..=10.0).contains(r)) {
+            return Err(Error::Block);
+        }
         let mut at = 0;
         for (index, (&s, &start)) in divisions.iter().zip(first).enumerate() {
             let own = facet.part(at..at + (s * s) as usize);
@@ -33,6 +39,6 @@ impl<'m> Elements<'m> {
         if first.last().map(|end| *end as usize) != Some(at) {
             return Err(Error::Block);
         }
-        Ok(Elements { first, divisions, facet, sides: scene.sides(), memory })
+        Ok(Elements { first, divisions, facet, roughness, sides: scene.sides(), memory })
     }
 }
