@@ -61,6 +61,11 @@
 #define BLIK_VERSION (((BLIK_VERSION_MAJOR * 10000) + (BLIK_VERSION_MINOR * 100)) + BLIK_VERSION_PATCH)
 
 /**
+ * Boundary, in bytes, on which a baked block starts.
+ */
+#define BLIK_BLOCK_ALIGNMENT 64
+
+/**
  * `limited_by` of blik_report: the estimate is 0.
  */
 #define BLIK_LIMIT_NOTHING 0
@@ -461,33 +466,6 @@ typedef struct blik_scene blik_scene;
 typedef struct blik_solution blik_solution;
 
 /**
- * What decides the coupling besides the scene. Set by blik_settings_init first.
- */
-typedef struct blik_settings {
-    /**
-     * Set by the init function.
-     */
-    size_t struct_size;
-    /**
-     * The wanted error of an image, eq. 16 of the paper, relative to the reference radiance: 1e-6 to 0.1; default
-     * 2e-3.
-     */
-    double tolerance;
-    /**
-     * Light reflected more often does not count; below 0 (default): by tolerance.
-     */
-    int32_t max_bounces;
-    /**
-     * Not 0: irradiance of all facets is wanted, also of those that reflect nothing diffusely; default 0.
-     */
-    int32_t all_irradiances;
-    /**
-     * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
-     */
-    int32_t directional;
-} blik_settings;
-
-/**
  * What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
  * to be set before.
  */
@@ -521,6 +499,33 @@ typedef struct blik_error {
      */
     size_t given;
 } blik_error;
+
+/**
+ * What decides the coupling besides the scene. Set by blik_settings_init first.
+ */
+typedef struct blik_settings {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * The wanted error of an image, eq. 16 of the paper, relative to the reference radiance: 1e-6 to 0.1; default
+     * 2e-3.
+     */
+    double tolerance;
+    /**
+     * Light reflected more often does not count; below 0 (default): by tolerance.
+     */
+    int32_t max_bounces;
+    /**
+     * Not 0: irradiance of all facets is wanted, also of those that reflect nothing diffusely; default 0.
+     */
+    int32_t all_irradiances;
+    /**
+     * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
+     */
+    int32_t directional;
+} blik_settings;
 
 /**
  * One task of a stage: to be called once with each index, on any thread.
@@ -1073,6 +1078,47 @@ extern "C" {
  * the header. May be called by any number of threads at once.
  */
 uint32_t blik_version(void);
+
+/**
+ * Bytes of the block that blik_bake writes.
+ */
+int32_t blik_bake_size(const struct blik_coupling *coupling,
+                       const struct blik_solution *solution,
+                       struct blik_error *error,
+                       size_t *bytes);
+
+/**
+ * Writes scene, tree, coupling and, where it is not null, a solution of this coupling as one relocatable block, with
+ * version, byte order, size and checksum, to `block`, which starts on a boundary of `BLIK_BLOCK_ALIGNMENT`.
+ */
+int32_t blik_bake(const struct blik_coupling *coupling,
+                  const struct blik_solution *solution,
+                  void *block,
+                  size_t size,
+                  struct blik_error *error);
+
+/**
+ * Bytes of memory that blik_load needs for the handles of a block: some hundred, and some for each part of the
+ * coupling. Only the block's head is read.
+ */
+int32_t blik_load_size(const void *block,
+                       size_t size,
+                       struct blik_error *error,
+                       size_t *bytes);
+
+/**
+ * Checks the block in `block` from end to end and makes handles over it, in `memory`; the block itself is read where
+ * it stands (read-only memory will do) for as long as the handles are in use. `*solution` becomes null where the block
+ * has none. A block that is damaged or hostile is refused by `BLIK_ERROR_BLOCK`.
+ */
+int32_t blik_load(const void *block,
+                  size_t size,
+                  void *memory,
+                  size_t memory_size,
+                  struct blik_error *error,
+                  const struct blik_scene **scene,
+                  const struct blik_coupling **coupling,
+                  const struct blik_solution **solution);
 
 /**
  * Bytes of memory with which blik_coupling_init can begin. The rows' own part is not known before: where it does
