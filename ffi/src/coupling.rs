@@ -294,7 +294,7 @@ impl Filler<'_> {
                 true
             })
         };
-        let part = (self.size - self.end) / lanes.max(1) & !(ALIGNMENT - 1);
+        let part = ((self.size - self.end) / lanes.max(1)) & !(ALIGNMENT - 1);
         let this = &*self;
         // every lane is one item, so that its region has one owner
         runner.each(lanes, lanes, share, &|_, lane| {

@@ -143,9 +143,11 @@ pub unsafe extern "C" fn blik_form_factor_visible(
             // SAFETY: aligned, and `count` of them fit behind `skip`.
             unsafe { start.add(i).write(Convex::EMPTY) };
         }
-        // SAFETY: all have just been written; without any, the pointer is aligned and not null.
-        let pieces =
-            if count == 0 { &mut [] } else { unsafe { core::slice::from_raw_parts_mut(start, count) } };
+        let pieces: &mut [Convex] = match count {
+            0 => &mut [],
+            // SAFETY: all have just been written.
+            _ => unsafe { core::slice::from_raw_parts_mut(start, count) },
+        };
         let estimate = form_factor::visible_polygon_to_polygon(a, b, occluders, tolerance, pieces)?;
         if let Ok(place) = needed(error_estimate) {
             // SAFETY: not null.

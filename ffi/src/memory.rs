@@ -165,9 +165,8 @@ impl Slab {
         let bytes = bytes.clamp(1, self.layout.size());
         let Ok(layout) = std::alloc::Layout::from_size_align(bytes, ALIGNMENT) else { return };
         // SAFETY: allocated with this layout, and the new size is neither 0 nor larger.
-        if let Some(start) =
-            NonNull::new(unsafe { std::alloc::realloc(self.start.as_ptr(), self.layout, bytes) })
-        {
+        let moved = unsafe { std::alloc::realloc(self.start.as_ptr(), self.layout, bytes) };
+        if let Some(start) = NonNull::new(moved) {
             (self.start, self.layout) = (start, layout);
         }
     }

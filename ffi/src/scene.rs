@@ -202,8 +202,8 @@ pub unsafe extern "C" fn blik_scene_create(
 /// Null or a scene that nobody uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn blik_scene_destroy(scene: *mut blik_scene) {
-    // SAFETY: by the caller's promise.
     let _ = caught(|| {
+        // SAFETY: by the caller's promise.
         unsafe { end(scene) };
         Ok(())
     });

@@ -115,7 +115,7 @@ struct Given<'a> {
 ///
 /// # Safety
 /// `at` is null or has `bands` values.
-unsafe fn values<'a>(at: *const f64, bands: usize, defaults: &'a [f64]) -> Result<&'a [f64], blik_error> {
+unsafe fn values(at: *const f64, bands: usize, defaults: &[f64]) -> Result<&[f64], blik_error> {
     if at.is_null() {
         return Ok(defaults.get(..bands).unwrap_or(defaults));
     }
@@ -435,7 +435,7 @@ impl Shine<'_> {
         let size = scratch.len();
         let start = Start(scratch.as_mut_ptr());
         while next < rows {
-            let part = size / lanes.max(1) & !(ALIGNMENT - 1);
+            let part = (size / lanes.max(1)) & !(ALIGNMENT - 1);
             let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
             let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
             let mut done = [0; MOST_LANES];

@@ -316,9 +316,7 @@ impl From<Error> for blik_error {
             }
             Error::Direction { field } => e::of(BLIK_ERROR_DIRECTION).field(number(field)),
             Error::CameraFrame { field } => e::of(BLIK_ERROR_CAMERA).field(number(field)),
-            Error::Mismatch { what } if what == "coupling without directions" => {
-                e::of(BLIK_ERROR_NOT_DIRECTIONAL)
-            }
+            Error::Mismatch { what: "coupling without directions" } => e::of(BLIK_ERROR_NOT_DIRECTIONAL),
             Error::Mismatch { .. } => e::of(BLIK_ERROR_HANDLE),
             Error::Diverges { row_sum } => e::of(BLIK_ERROR_DIVERGES).at(0, 0, row_sum),
             Error::Cancelled => e::of(BLIK_ERROR_CANCELLED),
