@@ -48,6 +48,12 @@ impl BeamSettings {
     }
 }
 
+/// The most rays of one row, and so about half the records that it may need while it grows.
+pub fn most_rays(scene: &Scene<'_>, settings: &BeamSettings) -> usize {
+    let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
+    ((largest * settings.density).clamp(RAYS.0, RAYS.1) as usize).next_power_of_two()
+}
+
 /// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
 fn seen_area(scene: &Scene<'_>, sun: &Sun<'_>, facet: usize, side: usize) -> f64 {
     if scene.mirror(scene.material(facet)) == NO_MIRROR {

@@ -5,6 +5,7 @@
 //! `t`, ties to the lowest facet index, whatever the builder and the instruction set.
 
 mod above;
+mod bake;
 mod build;
 mod collapse;
 #[cfg(feature = "std")]

@@ -3,6 +3,7 @@
 
 use crate::bvh::Bvh;
 use crate::element::Elements;
+use crate::index::{Index, IndexMut};
 use crate::light::{Light, Shape};
 use crate::math::{FRAC_1_PI, Vec3, pow};
 use crate::mirror::{Mirror, Surface};
@@ -65,15 +66,27 @@ impl Terms {
     /// Sets the first `bands` values to zero.
     #[inline]
     pub fn clear(&mut self, bands: usize) {
-        self.diffuse[..bands].fill(0.0);
-        self.mirror_sky[..bands].fill(0.0);
-        self.mirror_diffuse[..bands].fill(0.0);
+        self.diffuse.head_mut(bands).fill(0.0);
+        self.mirror_sky.head_mut(bands).fill(0.0);
+        self.mirror_diffuse.head_mut(bands).fill(0.0);
+    }
+
+    /// Adds the first `bands` values of `next`.
+    pub fn add(&mut self, next: &Terms, bands: usize) {
+        let pairs = [
+            (&mut self.diffuse, &next.diffuse),
+            (&mut self.mirror_sky, &next.mirror_sky),
+            (&mut self.mirror_diffuse, &next.mirror_diffuse),
+        ];
+        for (to, from) in pairs {
+            to.iter_mut().zip(from).take(bands).for_each(|(to, from)| *to += from);
+        }
     }
 
     /// Radiance in one band.
     #[inline]
     pub fn sum(&self, band: usize) -> f64 {
-        self.diffuse[band] + self.mirror_sky[band] + self.mirror_diffuse[band]
+        self.diffuse.at(band) + self.mirror_sky.at(band) + self.mirror_diffuse.at(band)
     }
 }
 
@@ -141,7 +154,7 @@ impl Solved<'_> {
         let mut path = Path::default();
         let bands = self.shape.bands;
         let mut leg = Leg { ray: *ray, through: [0.0; MAX_BANDS], mirrors: 0, lobe: false };
-        leg.through[..bands].fill(1.0);
+        leg.through.head_mut(bands).fill(1.0);
         self.follow(leg, sample, true, terms, &mut path);
         path
     }
@@ -163,7 +176,7 @@ impl Solved<'_> {
             let specular = self.scene.specular(surface.material);
             let bands = self.shape.bands;
             let mut largest = 0.0;
-            for (through, rho) in leg.through[..bands].iter_mut().zip(specular) {
+            for (through, rho) in leg.through.head_mut(bands).iter_mut().zip(specular) {
                 *through *= rho;
                 largest = f64::max(largest, *through);
             }
@@ -198,7 +211,7 @@ impl Solved<'_> {
     /// One ray of a lobe, weighed with the lobe's albedo.
     fn turn(&self, leg: &mut Leg, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
         let (direction, share) = surface.go_on(self.scene, mirror, leg.ray.direction, u, v);
-        leg.through[..self.shape.bands].iter_mut().for_each(|t| *t *= share);
+        leg.through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
         leg.ray = surface.leave(direction);
     }
 
@@ -215,13 +228,13 @@ impl Solved<'_> {
         let Some(lobe) = &mirror.lobe else { return };
         let n = self.lobe_rays(surface.material, sample);
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
-        let largest = leg.through[..self.shape.bands].iter().fold(0.0, |a: f64, &b| a.max(b));
+        let largest = leg.through.head(self.shape.bands).iter().fold(0.0, |a: f64, &b| a.max(b));
         path.noise += LOBE_ERROR * largest * pow(f64::from(n), -1.0 / LOBE_POWER);
         let share = lobe.albedo(mirrored.dot(surface.normal)) / f64::from(n);
         for i in 0..n {
             let direction = lobe.ray(i as usize, n as usize, mirrored, surface.normal);
             let mut through = leg.through;
-            through[..self.shape.bands].iter_mut().for_each(|t| *t *= share);
+            through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
             let next = Leg { ray: surface.leave(direction), through, mirrors: leg.mirrors, lobe: true };
             path.rays += 1;
             self.follow(next, Sample::OneOf { seed: sample.seed(), index: i }, false, terms, path);
@@ -246,19 +259,17 @@ impl Solved<'_> {
         let bands = self.shape.bands;
         if let Some(sky) = &self.light.sky {
             let mut radiance = [0.0; MAX_BANDS];
-            sky.radiance(leg.ray.direction, &mut radiance[..bands]);
-            for (band, l) in radiance[..bands].iter().enumerate() {
-                terms.mirror_sky[band] += leg.through[band] * l;
-            }
+            sky.radiance(leg.ray.direction, radiance.head_mut(bands));
+            let own = radiance.iter().zip(&leg.through).take(bands);
+            terms.mirror_sky.iter_mut().zip(own).for_each(|(to, (l, through))| *to += through * l);
         }
         if let Some(sun) = &self.light.sun
             && !sun.is_point()
             && !leg.lobe
             && sun.contains(leg.ray.direction)
         {
-            for band in 0..bands {
-                terms.mirror_sky[band] += leg.through[band] * sun.disc_radiance(band);
-            }
+            let own = terms.mirror_sky.iter_mut().zip(&leg.through).take(bands);
+            own.enumerate().for_each(|(band, (to, through))| *to += through * sun.disc_radiance(band));
         }
     }
 
@@ -267,9 +278,8 @@ impl Solved<'_> {
     fn add_diffuse(&self, leg: &Leg, surface: &Surface, sample: Sample, terms: &mut Terms, path: &mut Path) {
         let bands = self.shape.bands;
         let to = if leg.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
-        for (band, &own) in self.scene.emission(surface.material).iter().enumerate() {
-            to[band] += leg.through[band] * own;
-        }
+        let emission = self.scene.emission(surface.material);
+        to.iter_mut().zip(&leg.through).zip(emission).for_each(|((to, through), own)| *to += through * own);
         let diffuse = self.scene.diffuse(surface.material);
         let level = match self.settings.max_bounces {
             Some(most) if leg.mirrors >= most => return,
@@ -280,22 +290,23 @@ impl Solved<'_> {
             return;
         }
         let (unknown, (a, b)) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
-        let values = &self.irradiance[self.shape.at(unknown, level.min(self.shape.levels - 1))];
+        let values =
+            self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
         let sunlit = self.sun_cosine(surface, sample, path);
         let mut weight = 0.0;
-        for band in 0..bands {
-            let smooth = values[band] + a * values[bands + band] + b * values[2 * bands + band];
+        for (band, ((to, through), rho)) in to.iter_mut().zip(&leg.through).zip(diffuse).enumerate() {
+            let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
             let mut irradiance = smooth.max(0.0);
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
                 irradiance += sunlit * sun.irradiance(band);
             }
-            let share = leg.through[band] * diffuse[band];
-            to[band] += share * FRAC_1_PI * irradiance;
+            let share = through * rho;
+            *to += share * FRAC_1_PI * irradiance;
             weight = f64::max(weight, share);
         }
-        path.noise += weight * f64::from(self.noise[unknown]);
+        path.noise += weight * f64::from(self.noise.at(unknown));
     }
 
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
@@ -342,8 +353,7 @@ impl Solved<'_> {
         }
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
         let value = lobe.value(mirrored.dot(toward));
-        for band in 0..self.shape.bands {
-            terms.mirror_sky[band] += leg.through[band] * sun.irradiance(band) * value;
-        }
+        let own = terms.mirror_sky.iter_mut().zip(&leg.through).take(self.shape.bands);
+        own.enumerate().for_each(|(band, (to, through))| *to += through * sun.irradiance(band) * value);
     }
 }

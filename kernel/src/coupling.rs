@@ -4,6 +4,8 @@
 //! Rows of unknowns are computed by [`rows::fill`] into blocks of caller memory, each block a range of rows;
 //! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
 
+mod bake;
+pub mod pack;
 pub mod rows;
 pub mod sink;
 pub mod word;
@@ -160,6 +162,24 @@ pub struct Block<'m> {
 }
 
 impl<'m> Block<'m> {
+    /// A block without rows.
+    pub const EMPTY: Block<'static> = Block {
+        head: Head {
+            first: 0,
+            rows: 0,
+            records: 0,
+            words: 0,
+            capacity: 0,
+            bands: 0,
+            room: 0,
+            directional: 0,
+        },
+        rows: &[],
+        words: &[],
+        products: &[],
+        records: &[],
+    };
+
     /// Opens what [`rows::fill`] wrote.
     pub fn open(memory: &'m [u8]) -> Result<Block<'m>, Error> {
         let mut view = View::new(memory);
@@ -261,6 +281,11 @@ impl<'m> Coupling<'m> {
             return Err(Error::Mismatch { what: "coupling block" });
         }
         Ok(Coupling { blocks, unknowns })
+    }
+
+    /// Blocks that cover any one range of rows, in order.
+    pub fn part(blocks: &'m [Block<'m>]) -> Coupling<'m> {
+        Coupling { blocks, unknowns: blocks.last().map_or(0, |b| b.range().end) }
     }
 
     /// Number of rows.

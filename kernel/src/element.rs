@@ -3,8 +3,11 @@
 //! The cut depends on geometry, materials and tolerance, never on the light. An unknown of the linear system
 //! is one side of one element: unknown = element * sides + side.
 
+mod bake;
+
 use crate::arena::{Arena, Need};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, sqrt};
 use crate::scene::Scene;
 
@@ -59,12 +62,12 @@ impl<'m> Elements<'m> {
         let mut at = 0;
         for (f, &s) in divisions.iter().enumerate() {
             let s = s.clamp(1, MAX_DIVISIONS);
-            first[f] = at as u32;
-            kept[f] = s;
-            facet[at..at + (s * s) as usize].fill(f as u32);
+            first.set(f, at as u32);
+            kept.set(f, s);
+            facet.part_mut(at..at + (s * s) as usize).fill(f as u32);
             at += (s * s) as usize;
         }
-        first[divisions.len()] = at as u32;
+        first.set(divisions.len(), at as u32);
         Ok(Elements { first, divisions: kept, facet, roughness, sides: scene.sides(), memory: needed })
     }
 
@@ -83,27 +86,27 @@ impl<'m> Elements<'m> {
     /// Facet and side of an unknown.
     #[inline(always)]
     pub fn facet_of(&self, unknown: usize) -> (usize, usize) {
-        (self.facet[unknown / self.sides] as usize, unknown % self.sides)
+        (self.facet.at(unknown / self.sides.max(1)) as usize, unknown % self.sides.max(1))
     }
 
     /// The unknowns of one side of a facet.
     pub fn unknowns_of(&self, facet: usize, side: usize) -> impl Iterator<Item = usize> + use<> {
         let sides = self.sides;
-        (self.first[facet] as usize..self.first[facet + 1] as usize).map(move |e| e * sides + side)
+        (self.first.at(facet) as usize..self.first.at(facet + 1) as usize).map(move |e| e * sides + side)
     }
 
     /// Share of its facet's area that each of a facet's elements has.
     #[inline(always)]
     pub fn share(&self, facet: usize) -> f64 {
-        let s = f64::from(self.divisions[facet]);
+        let s = f64::from(self.divisions.at(facet));
         1.0 / (s * s)
     }
 
     /// The unknown at the point of barycentric weights (u, v) of a facet's side, and the point on its element.
     #[inline(always)]
     pub fn locate(&self, facet: usize, side: usize, u: f64, v: f64) -> (usize, Local) {
-        let s = self.divisions[facet];
-        let first = self.first[facet] as usize;
+        let s = self.divisions.at(facet);
+        let first = self.first.at(facet) as usize;
         if s == 1 {
             return (first * self.sides + side, (u - 1.0 / 3.0, v - 1.0 / 3.0));
         }
@@ -121,11 +124,11 @@ impl<'m> Elements<'m> {
     /// Barycentric weights in the facet of the point (a, b) (weights of corners 1 and 2) of an element.
     #[inline(always)]
     pub fn in_facet(&self, element: usize, a: f64, b: f64) -> (f64, f64) {
-        let facet = self.facet[element] as usize;
-        let s = self.divisions[facet];
-        let mut rest = element as u32 - self.first[facet];
+        let facet = self.facet.at(element) as usize;
+        let s = self.divisions.at(facet);
+        let mut rest = element as u32 - self.first.at(facet);
         let mut i = 0;
-        while rest >= 2 * (s - i) - 1 {
+        while i < s && rest >= 2 * (s - i) - 1 {
             rest -= 2 * (s - i) - 1;
             i += 1;
         }
@@ -141,12 +144,12 @@ impl<'m> Elements<'m> {
     /// How far the blocked share of the hemisphere departs from linear functions over a facet's elements, rms.
     #[inline(always)]
     pub fn roughness(&self, facet: usize) -> f64 {
-        f64::from(self.roughness[facet])
+        f64::from(self.roughness.at(facet))
     }
 
     /// Corners of an element in scene coordinates, wound as its facet.
     pub fn corners(&self, scene: &Scene<'_>, element: usize) -> [Vec3; 3] {
-        let triangle = &scene.corners()[self.facet[element] as usize];
+        let triangle = &scene.corners().at(self.facet.at(element) as usize);
         [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
             let (u, v) = self.in_facet(element, a, b);
             point(triangle, u, v)

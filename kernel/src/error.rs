@@ -182,6 +182,8 @@ pub enum Error {
     },
     /// The caller's progress function asked to stop.
     Cancelled,
+    /// A baked block is damaged, of another version or byte order, or none.
+    Block,
 }
 
 impl fmt::Display for Error {
@@ -241,6 +243,9 @@ impl fmt::Display for Error {
                 )
             }
             Error::Cancelled => write!(f, "cancelled"),
+            Error::Block => {
+                write!(f, "the baked block is damaged, of another version or byte order, or none")
+            }
         }
     }
 }

@@ -17,9 +17,10 @@ use crate::coupling::rows::{RowSettings, fill};
 use crate::coupling::{Block, Coupling, sink};
 use crate::element::Elements;
 use crate::error::Error;
+use crate::facets;
 use crate::image::{self, Tally, Target};
 use crate::light::{self, Light, Shape};
-use crate::math::{FRAC_1_PI, Vec3};
+use crate::math::Vec3;
 use crate::policy::{self, Sweeps};
 use crate::radiosity::System;
 use crate::scene::{Scene, SceneInput};
@@ -506,30 +507,13 @@ impl Lit<'_> {
     /// material, by facet, then side. Irradiance is the mean over the facet of all that arrives; diffuse
     /// radiance is emission + rho_d irradiance/pi. Degenerate facets: zeros.
     pub fn facets(&self, mut each: impl FnMut(usize, usize, f64, &[f64], &[f64])) {
-        let (scene, elements) = (&self.geometry.scene, &self.geometry.elements);
+        let (scene, solved) = (&self.geometry.scene, self.solved());
         let Ok(coupling) = self.geometry.coupling() else { return };
-        let (bands, last) = (self.shape.bands, self.shape.levels - 1);
-        let level = self.geometry.settings.max_bounces.map_or(last, |most| last.min(most as usize));
-        let (mut irradiance, mut radiance) = (std::vec![0.0; bands], std::vec![0.0; bands]);
+        let (mut irradiance, mut radiance) =
+            (std::vec![0.0; self.shape.bands], std::vec![0.0; self.shape.bands]);
         for facet in 0..scene.facets() {
             for side in 0..scene.sides() {
-                irradiance.fill(0.0);
-                for unknown in elements.unknowns_of(facet, side) {
-                    let mean = &self.irradiance[self.shape.at(unknown, level)][..bands];
-                    // what lies inside a body receives nothing
-                    let share = elements.share(facet) * f64::from(coupling.row(unknown).exposed);
-                    for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
-                        let sun = self.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
-                        *e += (m + self.sun[unknown] * sun) * share;
-                    }
-                }
-                let material = scene.material(facet);
-                let alive = if scene.areas()[facet] > 0.0 { 1.0 } else { 0.0 };
-                for (band, l) in radiance.iter_mut().enumerate() {
-                    irradiance[band] *= alive;
-                    *l = alive * scene.emission(material)[band]
-                        + scene.diffuse(material)[band] * FRAC_1_PI * irradiance[band];
-                }
+                facets::side(&solved, &coupling, &self.sun, facet, side, &mut irradiance, &mut radiance);
                 each(facet, side, scene.area(facet), &irradiance, &radiance);
             }
         }

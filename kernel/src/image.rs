@@ -4,6 +4,7 @@ use crate::arena::{Arena, Need};
 use crate::camera::{Camera, Sampling};
 use crate::chain::{Sample, Solved, Terms};
 use crate::error::{Error, Field};
+use crate::index::{Index, IndexMut, copy};
 use crate::math::{fabs, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
 use crate::scene::MAX_BANDS;
@@ -176,20 +177,19 @@ impl Painter<'_, '_> {
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let at = self.slot(row, j);
-            let slot = &mut self.lines[at..at + self.stride];
-            slot[..bands].copy_from_slice(&self.terms.diffuse[..bands]);
-            slot[bands..2 * bands].copy_from_slice(&self.terms.mirror_sky[..bands]);
-            slot[2 * bands..3 * bands].copy_from_slice(&self.terms.mirror_diffuse[..bands]);
-            slot[3 * bands] = f64::from(u8::from(path.object));
-            slot[3 * bands + 1] = path.noise;
-            slot[3 * bands + 2] = path.tail;
+            let slot = self.lines.part_mut(at..at + self.stride);
+            copy(slot.part_mut(0..bands), &self.terms.diffuse);
+            copy(slot.part_mut(bands..2 * bands), &self.terms.mirror_sky);
+            copy(slot.part_mut(2 * bands..3 * bands), &self.terms.mirror_diffuse);
+            let notes = [f64::from(u8::from(path.object)), path.noise, path.tail];
+            copy(slot.part_mut(3 * bands..3 * bands + 3), &notes);
         }
     }
 
     /// Counts an object pixel and its expected errors.
     fn note(&mut self, at: usize) {
         let end = at + self.stride;
-        let (object, noise, tail) = (self.lines[end - 3], self.lines[end - 2], self.lines[end - 1]);
+        let (object, noise, tail) = (self.lines.at(end - 3), self.lines.at(end - 2), self.lines.at(end - 1));
         if object > 0.0 {
             self.tally.object_pixels += 1;
             self.tally.noise2 += noise * noise;
@@ -199,12 +199,12 @@ impl Painter<'_, '_> {
 
     fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
         let bands = self.solved.shape.bands;
-        let slot = &self.lines[at..at + 3 * bands];
+        let slot = self.lines.part(at..at + 3 * bands);
         for band in 0..bands {
-            let sum = slot[band] + slot[bands + band] + slot[2 * bands + band];
-            target.image[index * bands + band] = sum as f32;
+            let sum = slot.at(band) + slot.at(bands + band) + slot.at(2 * bands + band);
+            target.image.set(index * bands + band, sum as f32);
             for (c, component) in target.components.iter_mut().enumerate().filter(|(_, o)| !o.is_empty()) {
-                component[index * bands + band] = slot[c * bands + band] as f32;
+                component.set(index * bands + band, slot.at(c * bands + band) as f32);
             }
         }
     }
@@ -213,7 +213,7 @@ impl Painter<'_, '_> {
     fn contrast(&self, row: isize, column: isize) -> f64 {
         let bands = self.solved.shape.bands;
         let value = |at: usize, band: usize| {
-            self.lines[at + band] + self.lines[at + bands + band] + self.lines[at + 2 * bands + band]
+            self.lines.at(at + band) + self.lines.at(at + bands + band) + self.lines.at(at + 2 * bands + band)
         };
         let centre = self.slot(row, column);
         let mut largest: f64 = 0.0;
@@ -223,7 +223,7 @@ impl Painter<'_, '_> {
                 for band in 0..bands {
                     let difference = fabs(value(at, band) - value(centre, band));
                     if difference > 0.0 {
-                        largest = largest.max(difference / self.solved.reference[band]);
+                        largest = largest.max(difference / self.solved.reference.at(band));
                     }
                 }
             }
@@ -247,20 +247,18 @@ impl Painter<'_, '_> {
             let path = self.solved.radiance(&ray, Sample::OneOf { seed, index: n }, &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
-            for band in 0..bands {
-                sums.diffuse[band] += self.terms.diffuse[band];
-                sums.mirror_sky[band] += self.terms.mirror_sky[band];
-                sums.mirror_diffuse[band] += self.terms.mirror_diffuse[band];
-                low[band] = low[band].min(self.terms.sum(band));
-                high[band] = high[band].max(self.terms.sum(band));
+            sums.add(&self.terms, bands);
+            for (band, (low, high)) in low.iter_mut().zip(&mut high).enumerate().take(bands) {
+                *low = low.min(self.terms.sum(band));
+                *high = high.max(self.terms.sum(band));
             }
             n += 1;
             if n == goal {
                 let mut seen: f64 = 0.0;
-                for band in 0..bands {
-                    let d = high[band] - low[band];
+                for ((low, high), reference) in low.iter().zip(&high).zip(self.solved.reference) {
+                    let d = high - low;
                     if d > 0.0 {
-                        seen = seen.max(d / self.solved.reference[band]);
+                        seen = seen.max(d / reference);
                     }
                 }
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
@@ -275,10 +273,10 @@ impl Painter<'_, '_> {
         self.tally.sampling2 += 0.25 * error * error;
         let share = 1.0 / f64::from(n);
         for band in 0..bands {
-            let terms = [sums.diffuse[band], sums.mirror_sky[band], sums.mirror_diffuse[band]];
-            target.image[index * bands + band] = ((terms[0] + terms[1] + terms[2]) * share) as f32;
+            let terms = [sums.diffuse.at(band), sums.mirror_sky.at(band), sums.mirror_diffuse.at(band)];
+            target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
             for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
-                component[index * bands + band] = (term * share) as f32;
+                component.set(index * bands + band, (term * share) as f32);
             }
         }
     }

@@ -61,6 +61,7 @@
 #![deny(unsafe_code)]
 
 pub mod arena;
+pub mod bake;
 pub mod beam;
 pub mod bvh;
 pub mod camera;
@@ -68,10 +69,12 @@ pub mod chain;
 pub mod coupling;
 pub mod element;
 pub mod error;
+pub mod facets;
 pub mod form_factor;
 #[cfg(feature = "std")]
 pub mod host;
 pub mod image;
+mod index;
 pub mod light;
 pub mod lobe;
 pub mod math;
@@ -86,6 +89,7 @@ pub mod scene;
 pub mod signature;
 pub mod simd;
 pub mod sky;
+mod sort;
 pub mod subdivide;
 pub mod sun;
 

@@ -2,6 +2,7 @@
 
 use crate::bvh::Bvh;
 use crate::element::point;
+use crate::index::Index;
 use crate::lobe::Lobe;
 use crate::math::{Vec3, reflect};
 use crate::ray::{Hit, Ray};
@@ -13,7 +14,7 @@ pub const OFFSET: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// True where nothing rises above the plane of a facet's side by as much as its rays start above it.
 pub fn opens_to_sky(scene: &Scene<'_>, bvh: &Bvh<'_>, facet: usize, normal: Vec3) -> bool {
-    let height = scene.corners()[facet].iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+    let height = scene.corners().at(facet).iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
     !bvh.rises_above(normal, height + 0.5 * OFFSET)
 }
 
@@ -46,7 +47,7 @@ impl Surface {
             material: scene.material(facet),
             u,
             v,
-            point: point(&scene.corners()[facet], u, v),
+            point: point(&scene.corners().at(facet), u, v),
             normal: scene.side_normal(facet, side),
         }
     }

@@ -250,8 +250,8 @@ mod tests {
             bary[0] += a / f64::from(n);
             bary[1] += b / f64::from(n);
         }
-        // means of smooth functions over 4,096 points: error of order n^-3/2 = 4e-6
-        assert!((z - 2.0 / 3.0).abs() < 3e-5 && (r2 - 0.5).abs() < 3e-5);
-        assert!((bary[0] - 1.0 / 3.0).abs() < 3e-5 && (bary[1] - 1.0 / 3.0).abs() < 3e-5);
+        // means over 4,096 points of functions with creases (the maps' diagonals): about n^-5/4 = 3e-5, three times that
+        assert!((z - 2.0 / 3.0).abs() < 1e-4 && (r2 - 0.5).abs() < 1e-4);
+        assert!((bary[0] - 1.0 / 3.0).abs() < 1e-4 && (bary[1] - 1.0 / 3.0).abs() < 1e-4);
     }
 }

@@ -12,6 +12,7 @@
 //! closed mesh cover the ray without a gap, at edges and corners too, and a facet far smaller than its distance
 //! from the ray is not hit by accident.
 
+use crate::index::Index;
 use crate::math::{Vec3, fabs};
 
 /// A half line, or a piece of one.
@@ -165,8 +166,8 @@ impl Line {
     #[inline(always)]
     pub fn image(&self, moved: [f64; 3]) -> [f64; 2] {
         let [first, second, along] = self.axes;
-        let depth = moved[along];
-        [moved[first] - self.shear[0] * depth, moved[second] - self.shear[1] * depth]
+        let depth = moved.at(along);
+        [moved.at(first) - self.shear[0] * depth, moved.at(second) - self.shear[1] * depth]
     }
 
     /// The three edge functions of the corners' images: twice the areas that the ray spans with the edges opposite

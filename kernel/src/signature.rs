@@ -3,6 +3,7 @@
 use crate::camera::Camera;
 use crate::chain::{Sample, Solved, Terms};
 use crate::error::Error;
+use crate::index::Index;
 use crate::math::{Vec3, frame, unit};
 use crate::qmc::{Sequence, hash2};
 use crate::ray::Ray;
@@ -100,7 +101,7 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
             sums.rays += 1 + u64::from(path.rays);
             if path.object {
                 sums.area += area;
-                for (band, i) in sums.intensity[..bands].iter_mut().enumerate() {
+                for (band, i) in sums.intensity.iter_mut().take(bands).enumerate() {
                     *i += terms.sum(band) * area;
                 }
             }
@@ -123,7 +124,7 @@ pub struct Signature {
 impl Signature {
     /// The signature in `band` against a background radiance.
     pub fn new(sums: &Sums, band: usize, background: f64) -> Signature {
-        let intensity = sums.intensity[band];
+        let intensity = sums.intensity.at(band);
         let mean_radiance = if sums.area > 0.0 { intensity / sums.area } else { 0.0 };
         let contrast = (background > 0.0).then(|| (mean_radiance - background) / background);
         Signature { intensity, mean_radiance, contrast }

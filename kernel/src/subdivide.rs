@@ -164,14 +164,15 @@ pub fn divisions(
             return Err(Error::Length { what: "divisions", expected: scene.facets(), given });
         }
     }
-    let total: f64 = scene.areas().iter().sum();
+    // where all facets are degenerate nothing is cut
+    let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let root = |facet: usize| {
         let rho = scene.diffuse(scene.material(facet)).iter().fold(0.0, |a: f64, &b| a.max(b));
         libm::cbrt(scene.areas()[facet] / total * unevenness[facet] * rho * rho)
     };
     let goal = 0.25 * tolerance * tolerance;
     let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;
-    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + COARSE * (2e-3 / tolerance).min(4.0);
+    let most = most_elements(scene.facets(), tolerance) as f64;
     loop {
         let mut elements = 0.0;
         for (facet, s) in out.iter_mut().enumerate() {
@@ -183,6 +184,11 @@ pub fn divisions(
         }
         factor *= 0.8;
     }
+}
+
+/// The most elements that [`divisions`] cuts `facets` facets into.
+pub fn most_elements(facets: usize, tolerance: f64) -> usize {
+    (facets as f64 * (1.0 + 2e-3 / tolerance) + COARSE * (2e-3 / tolerance).min(4.0)) as usize
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Whether anything of the mesh rises above a plane: if not, no ray that starts there and goes up meets anything.
 
 use super::{Bvh, LEAF, PAIR, STACK};
+use crate::index::Index;
 use crate::math::Vec3;
 
 /// See [`Bvh::rises_above`].
@@ -10,9 +11,10 @@ pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
     let mut top = usize::from(!bvh.boxes.is_empty());
     while top > 0 {
         top -= 1;
-        let node = stack[top] as usize;
+        let node = stack.at(top) as usize;
         let (Some(boxes), Some(children)) = (bvh.boxes.get(node), bvh.children.get(node)) else { continue };
         for (i, &child) in children.iter().enumerate() {
+            let i = i & 7;
             if boxes[0][0][i] > boxes[0][1][i] {
                 continue;
             }

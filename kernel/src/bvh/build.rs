@@ -5,7 +5,9 @@
 use super::{Boxes, LANES};
 use crate::arena::{Arena, Need};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::math::Vec3;
+use crate::sort;
 
 /// A box in f32 that holds its content's f64 coordinates: low, high.
 #[derive(Clone, Copy, Debug)]
@@ -33,10 +35,11 @@ impl Aabb {
 
     #[inline(always)]
     pub fn join(&mut self, other: &Aabb) {
-        for axis in 0..3 {
-            let (low, high) = (other.low[axis], other.high[axis]);
-            self.low[axis] = if low < self.low[axis] { low } else { self.low[axis] };
-            self.high[axis] = if high > self.high[axis] { high } else { self.high[axis] };
+        for (own, &low) in self.low.iter_mut().zip(&other.low) {
+            *own = if low < *own { low } else { *own };
+        }
+        for (own, &high) in self.high.iter_mut().zip(&other.high) {
+            *own = if high > *own { high } else { *own };
         }
     }
 
@@ -51,7 +54,7 @@ impl Aabb {
     /// Twice the centre.
     #[inline(always)]
     fn centre(&self, axis: usize) -> f32 {
-        self.low[axis] + self.high[axis]
+        self.low.at(axis) + self.high.at(axis)
     }
 
     pub fn read(&[low, high]: &[[f32; 3]; 2]) -> Aabb {
@@ -66,7 +69,8 @@ impl Aabb {
     pub fn write(&self, boxes: &mut Boxes, child: usize) {
         for ((axis, low), high) in boxes.iter_mut().zip(self.low).zip(self.high) {
             let [lows, highs] = axis;
-            (lows[child], highs[child]) = (low, high);
+            lows.set(child, low);
+            highs.set(child, high);
         }
     }
 }
@@ -123,7 +127,7 @@ impl<'s> Binary<'s> {
             *place = facet;
             live += 1;
         }
-        let (order, _) = order.split_at_mut(live);
+        let order = order.head_mut(live);
         Ok((Facets { boxes: own }, Binary { boxes, links, order, nodes: 0 }))
     }
 
@@ -156,15 +160,16 @@ pub(super) fn binned(facets: &Facets, tree: &mut Binary) {
         if node == level_end {
             (level, level_end) = (level + 1, tree.nodes);
         }
-        let [first, count] = tree.links[node];
+        let [first, count] = tree.links.at(node);
         if count as usize > LANES {
             let range = first as usize..(first + count) as usize;
-            let left = split(facets, &mut tree.order[range.clone()], level < SAH_LEVELS);
-            let (a, b) = tree.order[range].split_at(left);
+            let left = split(facets, tree.order.part_mut(range.clone()), level < SAH_LEVELS);
+            let own = tree.order.part(range);
+            let (a, b) = own.split_at(left.min(own.len()));
             let (a, b) = (bounds(facets, a), bounds(facets, b));
             let pair = tree.push(&a, first, left as u32);
             tree.push(&b, first + left as u32, count - left as u32);
-            tree.links[node] = [pair, 0];
+            tree.links.set(node, [pair, 0]);
         }
         node += 1;
     }
@@ -182,21 +187,23 @@ fn split(facets: &Facets, order: &mut [u32], by_area: bool) -> usize {
     for &facet in order.iter() {
         let bounds = facets.get(facet);
         for axis in 0..3 {
-            low[axis] = low[axis].min(bounds.centre(axis));
-            high[axis] = high[axis].max(bounds.centre(axis));
+            let centre = bounds.centre(axis);
+            let (least, most) = (low.at(axis).min(centre), high.at(axis).max(centre));
+            low.set(axis, least);
+            high.set(axis, most);
         }
     }
     if by_area && let Some((axis, plane)) = best_plane(facets, order, &low, &high) {
-        let bin = Binning::new(low[axis], high[axis]);
+        let bin = Binning::new(low.at(axis), high.at(axis));
         let left = partition(order, |facet| bin.of(facets.get(facet).centre(axis)) < plane);
         if left > 0 && left < order.len() {
             return left;
         }
     }
-    let widest = (1..3).fold(0, |a, b| if high[b] - low[b] > high[a] - low[a] { b } else { a });
+    let widest = (1..3).fold(0, |a, b| if high.at(b) - low.at(b) > high.at(a) - low.at(a) { b } else { a });
     let half = order.len() / 2;
     let key = |facet: &u32| facets.get(*facet).centre(widest);
-    order.select_nth_unstable_by(half, |a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+    sort::select(order, half, &|a: &u32, b: &u32| key(a).total_cmp(&key(b)).then(a.cmp(b)));
     half
 }
 
@@ -222,12 +229,12 @@ impl Binning {
 fn best_plane(facets: &Facets, order: &[u32], low: &[f32; 3], high: &[f32; 3]) -> Option<(usize, usize)> {
     let mut best = None;
     let mut least = f32::INFINITY;
-    for axis in (0..3).filter(|&axis| high[axis] > low[axis]) {
-        let binning = Binning::new(low[axis], high[axis]);
+    for axis in (0..3).filter(|&axis| high.at(axis) > low.at(axis)) {
+        let binning = Binning::new(low.at(axis), high.at(axis));
         let mut bins = [(Aabb::EMPTY, 0u32); BINS];
         for &facet in order {
             let own = facets.get(facet);
-            let (bounds, count) = &mut bins[binning.of(own.centre(axis))];
+            let Some((bounds, count)) = bins.get_mut(binning.of(own.centre(axis))) else { continue };
             bounds.join(&own);
             *count += 1;
         }
@@ -237,7 +244,7 @@ fn best_plane(facets: &Facets, order: &[u32], low: &[f32; 3], high: &[f32; 3]) -
             *place = cost(&mut sweep, bin);
         }
         sweep = (Aabb::EMPTY, 0);
-        for (plane, (bin, right)) in (1..).zip(bins.iter().zip(&right[1..])) {
+        for (plane, (bin, right)) in (1..).zip(bins.iter().zip(right.iter().skip(1))) {
             let total = cost(&mut sweep, bin) + right;
             if total < least && sweep.1 > 0 && (sweep.1 as usize) < order.len() {
                 (least, best) = (total, Some((axis, plane)));
@@ -259,8 +266,10 @@ fn cost(sweep: &mut (Aabb, u32), bin: &(Aabb, u32)) -> f32 {
 fn partition(order: &mut [u32], left: impl Fn(u32) -> bool) -> usize {
     let mut count = 0;
     for i in 0..order.len() {
-        if left(order[i]) {
-            order.swap(i, count);
+        let facet = order.at(i);
+        if left(facet) {
+            order.set(i, order.at(count));
+            order.set(count, facet);
             count += 1;
         }
     }

@@ -2,6 +2,7 @@
 
 use super::build::{Aabb, Binary};
 use super::{Boxes, LANES, LEAF, NONE, PAIR};
+use crate::index::{Index, IndexMut};
 
 /// What came out.
 pub(super) struct Made {
@@ -27,19 +28,26 @@ pub(super) fn collapse(
         if node == level_end {
             (levels, level_end) = (levels + 1, nodes);
         }
-        let (members, count) = open(tree, children[node][0]);
-        boxes[node] = [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3];
+        let (members, count) = open(tree, children.at(node)[0]);
+        boxes.set(node, [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3]);
         for (child, &member) in members.iter().take(count).enumerate() {
-            let [first, facets] = tree.links[member as usize];
-            Aabb::read(&tree.boxes[member as usize]).write(&mut boxes[node], child);
-            children[node][child] = if facets == 0 {
-                children[nodes][0] = member;
+            let [first, facets] = tree.links.at(member as usize);
+            if let Some(boxes) = boxes.get_mut(node) {
+                Aabb::read(&tree.boxes.at(member as usize)).write(boxes, child);
+            }
+            let made = if facets == 0 {
+                if let Some(place) = children.get_mut(nodes) {
+                    place[0] = member;
+                }
                 nodes += 1;
                 nodes as u32 - 1
             } else {
                 let own = tree.order.iter().skip(first as usize).take(facets as usize);
                 lanes.place(own)
             };
+            if let Some(children) = children.get_mut(node) {
+                children.set(child, made);
+            }
         }
         node += 1;
     }
@@ -48,20 +56,20 @@ pub(super) fn collapse(
 
 /// The up to eight descendants of a binary node that become children of one node.
 fn open(tree: &Binary, root: u32) -> ([u32; 8], usize) {
-    let inner = |member: u32| tree.links[member as usize][1] == 0;
+    let inner = |member: u32| tree.links.at(member as usize)[1] == 0;
     let mut members = [root; 8];
     let mut count = 1;
     while count < 8 {
-        let area = |member: u32| Aabb::read(&tree.boxes[member as usize]).half_area();
+        let area = |member: u32| Aabb::read(&tree.boxes.at(member as usize)).half_area();
         let candidates = members.iter().take(count).enumerate().filter(|&(_, &member)| inner(member));
         let largest = candidates.fold(None, |best: Option<(usize, f32)>, (place, &member)| match best {
             Some((_, most)) if area(member) <= most => best,
             _ => Some((place, area(member))),
         });
         let Some((place, _)) = largest else { break };
-        let first = tree.links[members[place] as usize][0];
-        members[place] = first;
-        members[count] = first + 1;
+        let first = tree.links.at(members.at(place) as usize)[0];
+        members.set(place, first);
+        members.set(count, first + 1);
         count += 1;
     }
     (members, count)

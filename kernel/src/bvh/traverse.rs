@@ -107,6 +107,11 @@ impl<'a> Walk<'a> {
             nearest: ray.t_max,
             limit: 0.0,
         };
+        // from so far away that not even the entry into the box is near it, nothing is hit; infinities would meet the
+        // children that there are not
+        if !walk.near.iter().chain(&walk.far).all(|x| x.is_finite()) {
+            return None;
+        }
         walk.shorten(ray.t_max);
         Some(walk)
     }

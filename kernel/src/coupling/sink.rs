@@ -5,6 +5,7 @@ use super::{BLOCKED, Head, Record, Row};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::error::Error;
 use crate::scene::Scene;
+use crate::sort;
 use core::cmp::Ordering;
 use core::ops::Range;
 
@@ -107,7 +108,7 @@ impl<'m> Sink<'m> {
         }
         let row = &mut self.records[self.start..kept];
         let words = &self.words;
-        row.sort_unstable_by(|a, b| order(words, a, b));
+        sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
         let kept = merge(row);
         let escapes = self.start + row[..kept].partition_point(|r| !r.is_escape());
         self.rows[self.done] = Row { start: self.start as u32, escapes: escapes as u32, ..stats };

@@ -6,6 +6,7 @@
 //! order and its bits do not depend on the order in which paths were found.
 
 use crate::arena::plain_struct;
+use crate::index::{Index, IndexMut};
 use crate::scene::Scene;
 use core::cmp::Ordering;
 
@@ -69,7 +70,7 @@ impl<'m> Words<'m> {
     #[inline]
     pub fn largest(&self, word: u16) -> f64 {
         let at = word as usize * self.bands;
-        self.products[at..at + self.bands].iter().fold(0.0, |a, &b| if b > a { b } else { a })
+        self.products.part(at..at + self.bands).iter().fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
     /// The word with one more letter; `None` where the table is full or the word has [`LONGEST`] letters.
@@ -102,11 +103,12 @@ impl<'m> Words<'m> {
         let new =
             u16::try_from(self.used).ok().filter(|&n| (n as usize) < self.words.len() && n < u16::MAX)?;
         let depth = self.get(word).depth + 1;
-        self.words[new as usize] = Word { class, depth, child: 0, sibling: first, parent: word, unused: 0 };
-        self.words[word as usize].child = new;
+        self.words
+            .set(new as usize, Word { class, depth, child: 0, sibling: first, parent: word, unused: 0 });
+        self.words.set(word as usize, Word { child: new, ..self.get(word) });
         let (from, to) = (word as usize * self.bands, new as usize * self.bands);
         for (band, &rho) in scene.specular(class as usize).iter().enumerate() {
-            self.products[to + band] = self.products[from + band] * rho;
+            self.products.set(to + band, self.products.at(from + band) * rho);
         }
         self.used += 1;
         Some(new)

@@ -64,7 +64,7 @@ impl<'a> Table<'a> {
             1 => factors.iter().fold(0.0, |largest: f64, factor| largest.max(*factor)),
             _ => factors.get(band).copied().unwrap_or(0.0),
         };
-        for sample in input.radiance.chunks_exact(input.bands) {
+        for sample in input.radiance.chunks_exact(input.bands.max(1)) {
             for (band, &value) in sample.iter().enumerate() {
                 let value = f64::from(value);
                 if !(value >= 0.0 && value.is_finite()) {
@@ -101,8 +101,8 @@ impl<'a> Table<'a> {
         let (top, left) = (floor(down), floor(along));
         let (t, s) = (down - top, along - left);
         let top = top as usize;
-        let left = (left as isize).rem_euclid(self.columns as isize) as usize;
-        let right = (left + 1) % self.columns;
+        let left = (left as isize).rem_euclid((self.columns as isize).max(1)) as usize;
+        let right = (left + 1) % self.columns.max(1);
         let (upper, lower) = (self.row(top), self.row((top + 1).min(self.rows - 1)));
         let corners = [
             (upper, left, (1.0 - t) * (1.0 - s)),
@@ -122,7 +122,7 @@ impl<'a> Table<'a> {
     /// Largest sample per band.
     pub(super) fn largest(&self, out: &mut [f64]) {
         self.each_band(out, |sums| {
-            for sample in self.samples.chunks_exact(self.bands) {
+            for sample in self.samples.chunks_exact(self.bands.max(1)) {
                 for (largest, &value) in sums.iter_mut().zip(sample) {
                     *largest = largest.max(f64::from(value));
                 }
@@ -233,7 +233,7 @@ impl Rings {
         let bottom = if gap == rows { -FRAC_PI_2 } else { FRAC_PI_2 - (gap as f64 + 0.5) * step };
         // the plane's horizon lies between these elevations
         let turn = atan2(across, fabs(height));
-        let bounds = [top, turn.clamp(bottom, top), (-turn).clamp(bottom, top), bottom];
+        let bounds = [top, turn.min(top).max(bottom), (-turn).min(top).max(bottom), bottom];
         let mut set = Rings { rings: [Ring::default(); 48], count: 0 };
         let (nodes, weights) = rule(points);
         for panel in bounds.windows(2) {

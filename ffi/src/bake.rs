@@ -1,0 +1,221 @@
+//! A prepared scene as one block of bytes: made on a workstation, loaded by a trainer without a copy.
+
+use crate::call;
+use crate::coupling::{Settings, blik_coupling};
+use crate::memory::*;
+use crate::scene::blik_scene;
+use crate::solution::{Tables, blik_solution};
+use crate::status::*;
+use blik_kernel::arena::ALIGNMENT;
+use blik_kernel::bake::{self, Baked, Numbers};
+use blik_kernel::coupling::Block;
+use blik_kernel::policy;
+use blik_kernel::simd::Isa;
+use core::ffi::c_void;
+use core::ptr::null;
+
+/// Boundary, in bytes, on which a baked block starts.
+pub const BLIK_BLOCK_ALIGNMENT: usize = 64;
+const _: () = assert!(BLIK_BLOCK_ALIGNMENT == ALIGNMENT);
+
+/// What is to be baked.
+fn baked(
+    coupling: &'static blik_coupling,
+    solution: Option<&'static blik_solution>,
+) -> Result<Baked<'static>, blik_error> {
+    if solution.is_some_and(|s| !core::ptr::eq(s.coupling, coupling)) {
+        return Err(blik_error::of(BLIK_ERROR_HANDLE));
+    }
+    let Settings { tolerance, max_bounces, all, directional } = coupling.settings;
+    let solution = solution.map(|s| bake::Solution {
+        sky: s.input.0,
+        sun: s.input.1,
+        reference: s.tables.reference,
+        irradiance: s.tables.irradiance,
+        lit: s.tables.sun,
+        noise: s.tables.noise,
+        numbers: Numbers {
+            brightest: s.tables.brightest,
+            solver: s.tables.solver,
+            sweeps: u64::from(s.tables.sweeps),
+            sun_rays: s.tables.sun_rays,
+        },
+    });
+    Ok(Baked {
+        scene: coupling.base.scene,
+        bvh: coupling.base.bvh,
+        elements: coupling.elements,
+        blocks: coupling.blocks,
+        settings: bake::Settings { tolerance, max_bounces, all, directional },
+        solution,
+    })
+}
+
+/// Bytes of the block that [`blik_bake`] writes.
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_bake_size(
+    coupling: *const blik_coupling,
+    solution: *const blik_solution,
+    error: *mut blik_error,
+    bytes: *mut usize,
+) -> i32 {
+    call(error, || {
+        let to = needed(bytes)?;
+        // SAFETY: by the caller's promise.
+        let baked = unsafe { baked(object(coupling)?, optional(solution)?) }?;
+        let size = baked.bytes()?;
+        // SAFETY: not null.
+        unsafe { to.write(size) };
+        Ok(())
+    })
+}
+
+/// A handle that may be null.
+///
+/// # Safety
+/// As for [`object`].
+unsafe fn optional<'a, T: Handle>(at: *const T) -> Result<Option<&'a T>, blik_error> {
+    // SAFETY: by the caller's promise.
+    if at.is_null() { Ok(None) } else { unsafe { object(at) }.map(Some) }
+}
+
+/// Writes scene, tree, coupling and, where it is not null, a solution of this coupling as one relocatable block, with
+/// version, byte order, size and checksum, to `block`, which starts on a boundary of `BLIK_BLOCK_ALIGNMENT`.
+///
+/// # Safety
+/// Pointers are null or valid; `block` has `size` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_bake(
+    coupling: *const blik_coupling,
+    solution: *const blik_solution,
+    block: *mut c_void,
+    size: usize,
+    error: *mut blik_error,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (baked, memory) =
+            unsafe { (baked(object(coupling)?, optional(solution)?)?, bytes(block, size)?) };
+        aligned(memory)?;
+        baked.write(memory)?;
+        Ok(())
+    })
+}
+
+fn aligned(memory: &[u8]) -> Result<(), blik_error> {
+    if memory.as_ptr().align_offset(ALIGNMENT) == 0 {
+        Ok(())
+    } else {
+        Err(blik_error::of(BLIK_ERROR_ALIGNMENT).sizes(ALIGNMENT, 0))
+    }
+}
+
+/// Bytes for the handles of a block with so many parts.
+fn load_bytes(blocks: usize) -> usize {
+    let handles = head::<blik_scene>() + head::<blik_coupling>() + head::<blik_solution>();
+    blocks.saturating_mul(size_of::<Block<'_>>()).saturating_add(handles + 2 * ALIGNMENT)
+}
+
+/// Bytes of memory that [`blik_load`] needs for the handles of a block: some hundred, and some for each part of the
+/// coupling. Only the block's head is read.
+///
+/// # Safety
+/// Pointers are null or valid; `block` has `size` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_load_size(
+    block: *const c_void,
+    size: usize,
+    error: *mut blik_error,
+    bytes: *mut usize,
+) -> i32 {
+    call(error, || {
+        let to = needed(bytes)?;
+        // SAFETY: by the caller's promise.
+        let block = unsafe { input(block.cast::<u8>(), size) }?;
+        aligned(block)?;
+        let size = load_bytes(Baked::count(block)?);
+        // SAFETY: not null.
+        unsafe { to.write(size) };
+        Ok(())
+    })
+}
+
+/// Checks the block in `block` from end to end and makes handles over it, in `memory`; the block itself is read where
+/// it stands (read-only memory will do) for as long as the handles are in use. `*solution` becomes null where the block
+/// has none. A block that is damaged or hostile is refused by `BLIK_ERROR_BLOCK`.
+///
+/// # Safety
+/// Pointers are null or valid; `block` has `size` bytes, `memory` has `memory_size`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_load(
+    block: *const c_void,
+    size: usize,
+    memory: *mut c_void,
+    memory_size: usize,
+    error: *mut blik_error,
+    scene: *mut *const blik_scene,
+    coupling: *mut *const blik_coupling,
+    solution: *mut *const blik_solution,
+) -> i32 {
+    call(error, || {
+        let (to_scene, to_coupling, to_solution) = (needed(scene)?, needed(coupling)?, needed(solution)?);
+        // SAFETY: by the caller's promise.
+        let (block, memory): (&'static [u8], &'static mut [u8]) =
+            unsafe { (input(block.cast::<u8>(), size)?, bytes(memory, memory_size)?) };
+        aligned(block)?;
+        let parts = Baked::count(block)?;
+        let (wanted, given) = (load_bytes(parts), memory.len());
+        if given < wanted {
+            return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(wanted, given));
+        }
+        let (scene_at, rest) = place::<blik_scene>(memory)?;
+        let (coupling_at, rest) = place::<blik_coupling>(rest)?;
+        let (solution_at, rest) = place::<blik_solution>(rest)?;
+        let table = rest.as_mut_ptr();
+        let table = table.wrapping_add(table.align_offset(align_of::<Block<'_>>())).cast::<Block<'static>>();
+        for i in 0..parts {
+            // SAFETY: `load_bytes` counted room for them.
+            unsafe { table.add(i).write(Block::EMPTY) };
+        }
+        // SAFETY: all have just been written.
+        let table = unsafe { core::slice::from_raw_parts_mut(table, parts) };
+        let baked = Baked::load(block, Isa::detect(), table)?;
+        let lit = match &baked.solution {
+            Some(solution) => Some((*solution, solution.light(baked.scene.bands())?)),
+            None => None,
+        };
+        let bake::Settings { tolerance, max_bounces, all, directional } = baked.settings;
+        let settings = Settings { tolerance, max_bounces, all, directional };
+        // SAFETY: `place` made room for each; the handles live as long as the caller's memory.
+        unsafe {
+            scene_at.write(blik_scene::new(baked.scene, baked.bvh));
+            let base: &'static blik_scene = &*scene_at.as_ptr();
+            coupling_at.write(blik_coupling::new(base, baked.elements, baked.blocks, settings));
+            let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
+            let mut solved = null();
+            if let Some((own, light)) = lit {
+                let tables = Tables {
+                    reference: own.reference,
+                    irradiance: own.irradiance,
+                    sun: own.lit,
+                    noise: own.noise,
+                    brightest: own.numbers.brightest,
+                    solver: own.numbers.solver,
+                    sweeps: own.numbers.sweeps as u32,
+                    sun_rays: own.numbers.sun_rays,
+                    bytes: size_of_val(own.irradiance) + size_of_val(own.lit) + size_of_val(own.noise),
+                };
+                let shape = policy::shape(max_bounces, base.scene.bands());
+                solution_at.write(blik_solution::new(coupled, light, (own.sky, own.sun), tables, shape));
+                solved = solution_at.as_ptr().cast_const();
+            }
+            to_scene.write(scene_at.as_ptr());
+            to_coupling.write(coupling_at.as_ptr());
+            to_solution.write(solved);
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,718 @@
+//! A scene under one light, solved: from here every view is computed.
+
+use crate::coupling::{Settings, blik_coupling};
+use crate::memory::*;
+use crate::run::{MOST_LANES, Runner, Start, Turns, blik_run};
+use crate::status::*;
+use crate::types::*;
+use crate::{call, caught};
+use blik_kernel::Error;
+use blik_kernel::arena::{ALIGNMENT, Arena, Need};
+use blik_kernel::beam::{self, BeamSettings};
+use blik_kernel::chain::Solved;
+use blik_kernel::coupling::{Block, Coupling, sink};
+use blik_kernel::light::{self, Light, Shape};
+use blik_kernel::policy::{self, Sweeps};
+use blik_kernel::radiosity::System;
+use blik_kernel::scene::MAX_BANDS;
+use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use blik_kernel::sun::{Sun, SunInput};
+use core::ffi::c_void;
+use core::ops::Range;
+
+/// A solved scene in memory. Read-only once made: any number of threads may use it at once.
+pub struct blik_solution {
+    tag: usize,
+    pub(crate) coupling: &'static blik_coupling,
+    pub(crate) light: Light<'static>,
+    /// What the light was made from.
+    pub(crate) input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
+    pub(crate) tables: Tables,
+    pub(crate) shape: Shape,
+    #[cfg(feature = "std")]
+    owner: Option<std::boxed::Box<Owned>>,
+}
+
+/// What the light gave.
+#[derive(Clone, Copy)]
+pub(crate) struct Tables {
+    pub reference: &'static [f64],
+    /// Mean and gradients of each unknown's irradiance without the sun's direct part.
+    pub irradiance: &'static [f64],
+    /// Mean of cos V of the sun.
+    pub sun: &'static [f64],
+    pub noise: &'static [f32],
+    pub brightest: f64,
+    pub solver: f64,
+    pub sweeps: u32,
+    pub sun_rays: u64,
+    pub bytes: usize,
+}
+
+impl Handle for blik_solution {
+    const TAG: usize = 0x5ce9_e003;
+
+    fn tag(at: *mut Self) -> *mut usize {
+        // SAFETY: only the place is computed, within memory of a handle's size.
+        unsafe { &raw mut (*at).tag }
+    }
+
+    #[cfg(feature = "std")]
+    fn owner(&mut self) -> &mut Option<std::boxed::Box<Owned>> {
+        &mut self.owner
+    }
+}
+
+impl blik_solution {
+    pub(crate) fn new(
+        coupling: &'static blik_coupling,
+        light: Light<'static>,
+        input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
+        tables: Tables,
+        shape: Shape,
+    ) -> blik_solution {
+        blik_solution {
+            tag: blik_solution::TAG,
+            coupling,
+            light,
+            input,
+            tables,
+            shape,
+            #[cfg(feature = "std")]
+            owner: None,
+        }
+    }
+
+    pub(crate) fn solved(&self) -> Solved<'_> {
+        let (base, settings) = (self.coupling.base, &self.coupling.settings);
+        Solved {
+            scene: &base.scene,
+            bvh: &base.bvh,
+            elements: &self.coupling.elements,
+            light: &self.light,
+            irradiance: self.tables.irradiance,
+            shape: self.shape,
+            noise: self.tables.noise,
+            reference: self.tables.reference,
+            brightest: self.tables.brightest,
+            settings: policy::chains(settings.tolerance, settings.max_bounces),
+        }
+    }
+}
+
+static ONES: [f64; MAX_BANDS] = [1.0; MAX_BANDS];
+static ZEROS: [f64; MAX_BANDS] = [0.0; MAX_BANDS];
+static PIS: [f64; MAX_BANDS] = [core::f64::consts::PI; MAX_BANDS];
+
+/// The caller's light, its arrays still the caller's.
+struct Given<'a> {
+    sky: Option<SkyInput<'a>>,
+    sun: Option<SunInput<'a>>,
+    reference: Option<&'a [f64]>,
+}
+
+/// One value per band, or the first of `defaults`.
+///
+/// # Safety
+/// `at` is null or has `bands` values.
+unsafe fn values(at: *const f64, bands: usize, defaults: &[f64]) -> Result<&[f64], blik_error> {
+    if at.is_null() {
+        return Ok(defaults.get(..bands).unwrap_or(defaults));
+    }
+    // SAFETY: by the caller's promise.
+    unsafe { input(at, bands) }
+}
+
+/// # Safety
+/// As for [`read`]; arrays have one value per band, the table as many as it says.
+unsafe fn given_sky<'a>(sky: *const blik_sky, bands: usize) -> Result<Option<SkyInput<'a>>, blik_error> {
+    if sky.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: by the caller's promise.
+    let (sky, radiance, ground) = unsafe {
+        let sky = read(sky)?;
+        (sky, values(sky.radiance, bands, &ONES)?, values(sky.ground, bands, &ZEROS)?)
+    };
+    let model = match sky.model {
+        BLIK_SKY_UNIFORM => SkyModel::Uniform,
+        BLIK_SKY_HEMISPHERE => SkyModel::Hemisphere,
+        BLIK_SKY_OVERCAST => SkyModel::Overcast,
+        BLIK_SKY_CIE => SkyModel::Cie { kind: sky.cie_type, sun_direction: sky.sun_direction },
+        BLIK_SKY_GRADIENT => SkyModel::Gradient,
+        BLIK_SKY_TABLE => {
+            let count = sky.table_rows.checked_mul(sky.table_columns);
+            let count = count.and_then(|n| n.checked_mul(sky.table_bands));
+            let count = count.ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_SKY_TABLE))?;
+            let zero = sky.table_azimuth_zero;
+            SkyModel::Table(SkyTable {
+                rows: sky.table_rows,
+                columns: sky.table_columns,
+                bands: sky.table_bands,
+                // SAFETY: by the caller's promise.
+                radiance: unsafe { input(sky.table, count) }?,
+                azimuth_zero: (zero != [0.0; 3]).then_some(zero),
+            })
+        }
+        other => return Err(blik_error::of(BLIK_ERROR_CHOICE).at(0, 0, f64::from(other))),
+    };
+    Ok(Some(SkyInput { model, radiance, ground, up: sky.up }))
+}
+
+impl Given<'_> {
+    /// # Safety
+    /// As for [`given_sky`].
+    unsafe fn new<'a>(light: *const blik_light, bands: usize) -> Result<Given<'a>, blik_error> {
+        // SAFETY: by the caller's promise.
+        let (light, sky) = unsafe {
+            let light = read(light)?;
+            (light, given_sky(light.sky, bands)?)
+        };
+        let sun = if light.sun.is_null() {
+            None
+        } else {
+            // SAFETY: by the caller's promise.
+            let (sun, irradiance) = unsafe {
+                let sun = read(light.sun)?;
+                (sun, values(sun.irradiance, bands, &PIS)?)
+            };
+            Some(SunInput { direction: sun.direction, irradiance, half_angle_deg: sun.half_angle_deg })
+        };
+        let reference = if light.reference_radiance.is_null() {
+            None
+        } else {
+            // SAFETY: by the caller's promise.
+            Some(unsafe { input(light.reference_radiance, bands) }?)
+        };
+        if let Some(reference) = reference {
+            light::check_reference(reference, bands)?;
+        }
+        let given = Given { sky, sun, reference };
+        given.light(bands)?;
+        Ok(given)
+    }
+
+    /// The kernel's light, checked.
+    fn light(&self, bands: usize) -> Result<Light<'_>, Error> {
+        Ok(Light {
+            sky: self.sky.as_ref().map(|s| Sky::new(s, bands)).transpose()?,
+            sun: self.sun.as_ref().map(|s| Sun::new(s, bands)).transpose()?,
+        })
+    }
+}
+
+/// How many of each thing a solution holds.
+struct Sizes {
+    shape: Shape,
+    unknowns: usize,
+    /// Radiances of all unknowns that are kept at once while solving.
+    orders: usize,
+    samples: usize,
+    beams: usize,
+}
+
+impl Sizes {
+    fn new(coupling: &blik_coupling, given: &Given<'_>) -> Result<Sizes, blik_error> {
+        let Settings { max_bounces, .. } = coupling.settings;
+        let scene = &coupling.base.scene;
+        let shape = policy::shape(max_bounces, scene.bands());
+        let samples = match given.sky.map(|s| s.model) {
+            Some(SkyModel::Table(table)) => table.radiance.len(),
+            _ => 0,
+        };
+        let light = given.light(scene.bands())?;
+        let mut beams = 0;
+        if let Some(settings) = light.sun.as_ref().and_then(|sun| beam_settings(coupling, sun)) {
+            beams = sink::bytes(16, 64, 2 * beam::most_rays(scene, &settings), scene.bands())?;
+        }
+        Ok(Sizes {
+            shape,
+            unknowns: coupling.elements.unknowns(),
+            orders: if shape.levels == 1 { 2 } else { shape.levels + 1 },
+            samples,
+            beams,
+        })
+    }
+
+    /// What stays.
+    fn kept(&self) -> Need {
+        let bands = self.shape.bands;
+        Need::new()
+            .and::<f64>(bands)
+            .and::<f64>(bands)
+            .and::<f64>(bands)
+            .and::<f64>(bands)
+            .and::<f32>(self.samples)
+            .and::<f64>(self.unknowns)
+            .and::<f64>(self.unknowns * self.shape.stride())
+            .and::<f32>(self.unknowns)
+    }
+
+    /// What is needed to make it; the beams of each lane.
+    fn bytes(&self) -> Result<usize, blik_error> {
+        let all = self.kept().and::<f64>(self.unknowns * self.shape.stride());
+        let all = all.and::<f64>(self.unknowns * self.shape.bands * self.orders).and::<u8>(self.beams);
+        let size = all.bytes()?.checked_add(head::<blik_solution>());
+        size.ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).sizes(usize::MAX, 0))
+    }
+}
+
+fn beam_settings(coupling: &blik_coupling, sun: &Sun<'_>) -> Option<BeamSettings> {
+    let Settings { tolerance, max_bounces, all, .. } = coupling.settings;
+    policy::beams(&coupling.base.scene, sun, tolerance, max_bounces, all)
+}
+
+/// Copies the caller's arrays, so that the light lives as long as its memory.
+fn keep(given: &Given<'_>, sizes: &Sizes, arena: &mut Arena<'static>) -> Result<Given<'static>, blik_error> {
+    let bands = sizes.shape.bands;
+    let mut copy = |from: &[f64]| -> Result<&'static [f64], blik_error> {
+        let to = arena.take::<f64>(bands)?;
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        Ok(to)
+    };
+    let (radiance, ground) = match &given.sky {
+        Some(sky) => (copy(sky.radiance)?, copy(sky.ground)?),
+        None => (copy(&[])?, copy(&[])?),
+    };
+    let irradiance = copy(given.sun.map_or(&[], |s| s.irradiance))?;
+    let reference = copy(given.reference.unwrap_or(&[]))?;
+    let samples = arena.take::<f32>(sizes.samples)?;
+    let sky = given.sky.map(|sky| {
+        let model = match sky.model {
+            SkyModel::Table(table) => {
+                samples.iter_mut().zip(table.radiance).for_each(|(to, from)| *to = *from);
+                SkyModel::Table(SkyTable {
+                    rows: table.rows,
+                    columns: table.columns,
+                    bands: table.bands,
+                    radiance: samples,
+                    azimuth_zero: table.azimuth_zero,
+                })
+            }
+            SkyModel::Uniform => SkyModel::Uniform,
+            SkyModel::Hemisphere => SkyModel::Hemisphere,
+            SkyModel::Overcast => SkyModel::Overcast,
+            SkyModel::Gradient => SkyModel::Gradient,
+            SkyModel::Cie { kind, sun_direction } => SkyModel::Cie { kind, sun_direction },
+        };
+        SkyInput { model, radiance, ground, up: sky.up }
+    });
+    let sun = given.sun.map(|sun| SunInput {
+        direction: sun.direction,
+        irradiance,
+        half_angle_deg: sun.half_angle_deg,
+    });
+    Ok(Given { sky, sun, reference: given.reference.map(|_| reference) })
+}
+
+/// Shares of the progress: direct light, sweeps, gathering.
+const SHARES: [f64; 4] = [0.3, 0.3, 0.2, 0.2];
+
+fn build(
+    coupling: &'static blik_coupling,
+    given: &Given<'_>,
+    memory: &'static mut [u8],
+    runner: &mut Runner,
+) -> Result<*mut blik_solution, blik_error> {
+    let sizes = Sizes::new(coupling, given)?;
+    let (needed, size) = (sizes.bytes()?, memory.len());
+    if size < needed {
+        return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, size));
+    }
+    let (place, rest) = place::<blik_solution>(memory)?;
+    let mut arena = Arena::new(rest, 0)?;
+    let (scene, elements) = (&coupling.base.scene, &coupling.elements);
+    let given = keep(given, &sizes, &mut arena)?;
+    let light = Light {
+        sky: given.sky.as_ref().map(|s| Sky::new(s, scene.bands())).transpose()?,
+        sun: given.sun.as_ref().map(|s| Sun::new(s, scene.bands())).transpose()?,
+    };
+    let reference = arena_reference(&given, &light, coupling, &mut arena)?;
+    let (unknowns, shape) = (sizes.unknowns, sizes.shape);
+    let sun = arena.take::<f64>(unknowns)?;
+    let irradiance = arena.take::<f64>(unknowns * shape.stride())?;
+    let noise = arena.take::<f32>(unknowns)?;
+    let direct = arena.take::<f64>(unknowns * shape.stride())?;
+    let orders = arena.take::<f64>(unknowns * shape.bands * sizes.orders)?;
+    let scratch = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
+
+    let matrix = coupling.matrix()?;
+    let shine = Shine { coupling, matrix: &matrix, light: &light, shape };
+    let sun_rays = shine.direct(direct, sun, scratch, runner)?;
+    let system = System { scene, elements, coupling: &matrix, light: &light, direct, sun: &*sun, shape };
+    let solve = Solve { system, settings: &coupling.settings, reference };
+    let (sweeps, radiance) = solve.run(orders, irradiance, runner)?;
+    policy::check_radiance(radiance, shape.bands)?;
+    let contrast = policy::at_stake(&solve.system, reference, radiance);
+    for (place, (_, row)) in noise.iter_mut().zip(matrix.rows(0..unknowns)) {
+        *place = policy::noise(&row.row, contrast);
+    }
+    let tables = Tables {
+        reference,
+        irradiance,
+        sun,
+        noise,
+        brightest: policy::brightest(&light, reference, radiance),
+        solver: sweeps.map_or(0.0, |s| s.error),
+        sweeps: sweeps.map_or(shape.levels as u32, |s| s.done),
+        sun_rays,
+        bytes: sizes.kept().bytes()?,
+    };
+    // SAFETY: `place` made room for it.
+    unsafe { place.write(blik_solution::new(coupling, light, (given.sky, given.sun), tables, shape)) };
+    Ok(place.as_ptr())
+}
+
+/// The reference radiance: the caller's, or from the light.
+fn arena_reference(
+    given: &Given<'static>,
+    light: &Light<'_>,
+    coupling: &blik_coupling,
+    arena: &mut Arena<'static>,
+) -> Result<&'static [f64], blik_error> {
+    if let Some(reference) = given.reference {
+        return Ok(reference);
+    }
+    let reference = arena.take::<f64>(coupling.base.scene.bands())?;
+    light.reference_radiance(&coupling.base.scene, reference);
+    Ok(reference)
+}
+
+/// Direct light at work.
+struct Shine<'a> {
+    coupling: &'a blik_coupling,
+    matrix: &'a Coupling<'a>,
+    light: &'a Light<'a>,
+    shape: Shape,
+}
+
+impl Shine<'_> {
+    /// Sky, sun and beams; the rays traced.
+    fn direct(
+        &self,
+        direct: &mut [f64],
+        lit: &mut [f64],
+        scratch: &mut [u8],
+        runner: &mut Runner,
+    ) -> Result<u64, blik_error> {
+        let (base, elements) = (self.coupling.base, &self.coupling.elements);
+        if let Some(sky) = &self.light.sky {
+            let accuracy = policy::sky_accuracy(self.coupling.settings.tolerance);
+            runner.rows(direct, self.shape.stride(), SHARES[0], |range, out| {
+                light::sky_rows(&base.scene, elements, self.matrix, sky, accuracy, range, self.shape, out)
+            })?;
+        }
+        let Some(sun) = &self.light.sun else { return Ok(0) };
+        let rays = Turns::new(0u64);
+        runner.rows(lit, 1, 0.5 * SHARES[1], |range, out| {
+            let traced = light::sun_rows(&base.scene, &base.bvh, elements, self.matrix, sun, range, out)?;
+            rays.with(|all| *all += traced);
+            Ok(())
+        })?;
+        let traced = rays.into_inner();
+        match beam_settings(self.coupling, sun) {
+            Some(settings) => Ok(traced + self.beams(sun, &settings, direct, scratch, runner)?),
+            None => Ok(traced),
+        }
+    }
+
+    /// Adds the sunlight that mirrors throw: each lane traces its rows in its part of the scratch memory, and the
+    /// results are added in the order of the rows.
+    fn beams(
+        &self,
+        sun: &Sun<'_>,
+        settings: &BeamSettings,
+        direct: &mut [f64],
+        scratch: &mut [u8],
+        runner: &mut Runner,
+    ) -> Result<u64, blik_error> {
+        let (base, elements) = (self.coupling.base, &self.coupling.elements);
+        let (scene, rows) = (&base.scene, base.scene.facets() * base.scene.sides());
+        let piece = rows.div_ceil(256).clamp(16, 1024);
+        let usual = sink::bytes(piece, 64, 2 * beam::most_rays(scene, settings), scene.bands())?;
+        let mut lanes = runner.lanes().min(scratch.len() / usual.max(1)).max(1);
+        let (mut next, mut traced) = (0, 0);
+        let size = scratch.len();
+        let start = Start(scratch.as_mut_ptr());
+        while next < rows {
+            let part = (size / lanes.max(1)) & !(ALIGNMENT - 1);
+            let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
+            let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
+            let mut done = [0; MOST_LANES];
+            let noted = Start(done.as_mut_ptr());
+            let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (rows + lanes * piece) as f64;
+            runner.each(lanes, lanes, share, &|_, lane| {
+                if range(lane).is_empty() {
+                    return Ok(());
+                }
+                // SAFETY: every lane is one item: its part of the scratch memory and its number are its own.
+                let (memory, noted) = unsafe {
+                    let memory = core::slice::from_raw_parts_mut(start.at(lane * part), part);
+                    (memory, &mut *noted.at(lane))
+                };
+                match beam::fill(scene, &base.bvh, elements, sun, settings, range(lane), memory) {
+                    Ok(rows) => *noted = rows,
+                    Err(Error::BufferTooSmall { .. }) => {}
+                    Err(error) => return Err(error.into()),
+                }
+                Ok(())
+            })?;
+            let before = next;
+            for (lane, done) in done.into_iter().enumerate().take(lanes).filter(|(_, done)| *done > 0) {
+                let wanted: Range<usize> =
+                    (before + lane * piece).min(rows)..(before + (lane + 1) * piece).min(rows);
+                if wanted.start != next {
+                    break;
+                }
+                // SAFETY: all lanes have ended: the memory is this thread's alone.
+                let memory = unsafe { core::slice::from_raw_parts(start.at(lane * part), part) };
+                let block = [Block::open(memory)?];
+                let thrown = Coupling::part(&block);
+                beam::add(&thrown, self.matrix, sun, self.shape, direct);
+                let rays = |r: &blik_kernel::coupling::Row| u64::from(r.rays) + u64::from(r.chain_rays);
+                traced +=
+                    thrown.rows(wanted.start..wanted.start + done).map(|(_, r)| rays(&r.row)).sum::<u64>();
+                next += done;
+            }
+            if next == before {
+                if lanes == 1 {
+                    let needed = size.saturating_mul(3);
+                    return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, size));
+                }
+                lanes = 1;
+            }
+        }
+        Ok(traced)
+    }
+}
+
+/// The linear system at work.
+struct Solve<'a> {
+    system: System<'a>,
+    settings: &'a Settings,
+    reference: &'a [f64],
+}
+
+impl Solve<'_> {
+    /// Fills the table of irradiances; the radiances that the last sweep gave, and how the sweeps went (none where
+    /// orders of reflection are kept apart).
+    fn run<'o>(
+        &self,
+        orders: &'o mut [f64],
+        irradiance: &mut [f64],
+        runner: &mut Runner,
+    ) -> Result<(Option<Sweeps>, &'o [f64]), blik_error> {
+        let shape = self.system.shape;
+        let size = self.system.elements.unknowns() * shape.bands;
+        let short = blik_error::of(BLIK_ERROR_INTERNAL);
+        if shape.levels > 1 {
+            self.orders(orders, size, irradiance, runner)?;
+            let last = orders.get(size * shape.levels..).ok_or(short)?;
+            return Ok((None, last));
+        }
+        let (from, to) = orders.split_at_mut_checked(size).ok_or(short)?;
+        self.start(from, runner)?;
+        let (sweeps, radiance) = self.converge(from, to, runner)?;
+        runner.rows(irradiance, shape.stride(), SHARES[3], |range, out| {
+            self.system.gather(range, 0, |_| radiance, out)
+        })?;
+        Ok((Some(sweeps), radiance))
+    }
+
+    fn start(&self, radiance: &mut [f64], runner: &mut Runner) -> Result<(), blik_error> {
+        runner.rows(radiance, self.system.shape.bands, 0.0, |range, out| {
+            self.system.start(range, out);
+            Ok(())
+        })
+    }
+
+    fn converge<'o>(
+        &self,
+        mut from: &'o mut [f64],
+        mut to: &'o mut [f64],
+        runner: &mut Runner,
+    ) -> Result<(Sweeps, &'o [f64]), blik_error> {
+        let largest = Turns::new(0.0);
+        runner.ranges(self.system.elements.unknowns(), SHARES[2], |range| {
+            let q = self.system.contraction(range);
+            largest.with(|all| *all = f64::max(*all, q));
+            Ok(())
+        })?;
+        let mut sweeps =
+            Sweeps::new(largest.into_inner(), self.settings.tolerance, self.settings.max_bounces);
+        while sweeps.more() {
+            let change = Turns::new(0.0);
+            let seen = &*from;
+            runner.rows(to, self.system.shape.bands, 0.0, |range, out| {
+                let own = self.system.sweep(range, seen, out, self.reference);
+                change.with(|all| *all = f64::max(*all, own));
+                Ok(())
+            })?;
+            core::mem::swap(&mut from, &mut to);
+            sweeps.took(change.into_inner())?;
+        }
+        Ok((sweeps, from))
+    }
+
+    /// Each order of reflection from those before it.
+    fn orders(
+        &self,
+        orders: &mut [f64],
+        size: usize,
+        irradiance: &mut [f64],
+        runner: &mut Runner,
+    ) -> Result<(), blik_error> {
+        let shape = self.system.shape;
+        let share = (SHARES[2] + SHARES[3]) / shape.levels as f64;
+        let short = blik_error::of(BLIK_ERROR_INTERNAL);
+        self.start(orders.get_mut(..size).ok_or(short)?, runner)?;
+        for level in 0..shape.levels {
+            let (done, rest) = orders.split_at_mut_checked(size * (level + 1)).ok_or(short)?;
+            let order = |at: usize| done.get(at * size..(at + 1) * size).unwrap_or_default();
+            runner.rows(irradiance, shape.stride(), share, |range, out| {
+                self.system.gather(range, level, order, out)
+            })?;
+            let (table, next) = (&*irradiance, rest.get_mut(..size).ok_or(short)?);
+            runner.rows(next, shape.bands, 0.0, |range, out| {
+                self.system.reflect(range, level, table, out);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with
+/// mirrors and a sun on several threads.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as the structs say.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_size(
+    coupling: *const blik_coupling,
+    light: *const blik_light,
+    error: *mut blik_error,
+    bytes: *mut usize,
+) -> i32 {
+    call(error, || {
+        let to = needed(bytes)?;
+        // SAFETY: by the caller's promise.
+        let (coupling, given) = unsafe {
+            let coupling: &blik_coupling = object(coupling)?;
+            (coupling, Given::new(light, coupling.base.scene.bands())?)
+        };
+        let size = Sizes::new(coupling, &given)?.bytes()?;
+        // SAFETY: not null.
+        unsafe { to.write(size) };
+        Ok(())
+    })
+}
+
+/// Lights a scene and solves for its diffuse radiance, in the caller's memory. For another light call it again, with
+/// the same memory or other: the coupling is not computed anew, and no ray toward the sky is traced. The coupling must
+/// outlive the solution.
+///
+/// # Safety
+/// Pointers are null or valid; nobody else uses the memory while the solution is in use.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_init(
+    coupling: *const blik_coupling,
+    light: *const blik_light,
+    run: *const blik_run,
+    memory: *mut c_void,
+    size: usize,
+    error: *mut blik_error,
+    solution: *mut *const blik_solution,
+) -> i32 {
+    call(error, || {
+        let to = needed(solution)?;
+        // SAFETY: by the caller's promise.
+        let (coupling, given, mut runner, memory) = unsafe {
+            let coupling: &blik_coupling = object(coupling)?;
+            let given = Given::new(light, coupling.base.scene.bands())?;
+            (coupling, given, Runner::new(run)?, bytes(memory, size)?)
+        };
+        let made = build(coupling, &given, memory, &mut runner)?;
+        // SAFETY: not null.
+        unsafe { to.write(made) };
+        Ok(())
+    })
+}
+
+/// As [`blik_solution_init`], in memory of its own; to be ended by [`blik_solution_destroy`].
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as the structs say.
+#[cfg(feature = "std")]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_create(
+    coupling: *const blik_coupling,
+    light: *const blik_light,
+    run: *const blik_run,
+    error: *mut blik_error,
+    solution: *mut *mut blik_solution,
+) -> i32 {
+    call(error, || {
+        let to = needed(solution)?;
+        // SAFETY: by the caller's promise.
+        let (coupling, given, mut runner) = unsafe {
+            let coupling: &blik_coupling = object(coupling)?;
+            let given = Given::new(light, coupling.base.scene.bands())?;
+            (coupling, given, Runner::new(run)?)
+        };
+        let sizes = Sizes::new(coupling, &given)?;
+        let mut more = sizes.beams * 4 * (runner.lanes() - 1);
+        loop {
+            let mut slab = Slab::new(sizes.bytes()? + more)?;
+            // SAFETY: the handle owns the slab, or is never made.
+            match build(coupling, &given, unsafe { slab.bytes_mut() }, &mut runner) {
+                Ok(made) => {
+                    // SAFETY: just made, and not null.
+                    unsafe {
+                        (*made).owner = Some(std::boxed::Box::new(Owned(std::vec![slab])));
+                        to.write(made);
+                    }
+                    return Ok(());
+                }
+                Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL && more < 1 << 32 => {
+                    more = 4 * (more + sizes.beams);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    })
+}
+
+/// Ends a solution and frees what it owns; nothing for null.
+///
+/// # Safety
+/// Null or a solution that nobody uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_destroy(solution: *mut blik_solution) {
+    let _ = caught(|| {
+        // SAFETY: by the caller's promise.
+        unsafe { end(solution) };
+        Ok(())
+    });
+}
+
+/// Reference radiance of each band, to which tolerance and errors are related.
+///
+/// # Safety
+/// Pointers are null or valid; `radiance` has one value per band.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_get_reference(
+    solution: *const blik_solution,
+    error: *mut blik_error,
+    radiance: *mut f64,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let solution: &blik_solution = unsafe { object(solution) }?;
+        let reference = solution.tables.reference;
+        // SAFETY: by the caller's promise.
+        let out = unsafe { output(radiance, reference.len()) }?;
+        out.iter_mut().zip(reference).for_each(|(to, from)| *to = *from);
+        Ok(())
+    })
+}

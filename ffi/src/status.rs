@@ -1,0 +1,371 @@
+//! Status codes, the fields that they speak of, and what a refused call tells besides.
+
+use blik_kernel::{Error, Field};
+use core::ffi::{CStr, c_char};
+
+/// Done.
+pub const BLIK_OK: i32 = 0;
+
+/// A pointer that must not be null is.
+pub const BLIK_ERROR_NULL: i32 = 1;
+
+/// A struct's `struct_size` is none that this library knows: it was not set by its init function.
+pub const BLIK_ERROR_STRUCT_SIZE: i32 = 2;
+
+/// A number stands for no choice: a type, a model, a projection, a sampling.
+pub const BLIK_ERROR_CHOICE: i32 = 3;
+
+/// A handle was not made by this library, is destroyed, or belongs to other handles than those given beside it.
+pub const BLIK_ERROR_HANDLE: i32 = 4;
+
+/// Memory is smaller than needed: `needed` and `given` are in bytes.
+pub const BLIK_ERROR_BUFFER_TOO_SMALL: i32 = 5;
+
+/// An array has the wrong number of entries: `needed` and `given`.
+pub const BLIK_ERROR_LENGTH: i32 = 6;
+
+/// More of something than there may be; `needed` is the limit.
+pub const BLIK_ERROR_TOO_MANY: i32 = 7;
+
+/// The mesh has no facets.
+pub const BLIK_ERROR_NO_FACETS: i32 = 8;
+
+/// The mesh has no materials.
+pub const BLIK_ERROR_NO_MATERIALS: i32 = 9;
+
+/// The number of spectral bands is outside 1 to 64; `given`.
+pub const BLIK_ERROR_BANDS: i32 = 10;
+
+/// Vertex `index` is not finite.
+pub const BLIK_ERROR_VERTEX: i32 = 11;
+
+/// Vertex normal `index` is zero or not finite.
+pub const BLIK_ERROR_NORMAL: i32 = 12;
+
+/// The mesh is too large or too small for double precision.
+pub const BLIK_ERROR_EXTENT: i32 = 13;
+
+/// Facet `index` has a vertex index (`value`) out of range.
+pub const BLIK_ERROR_VERTEX_INDEX: i32 = 14;
+
+/// Facet `index` has a normal index (`value`) out of range.
+pub const BLIK_ERROR_NORMAL_INDEX: i32 = 15;
+
+/// Facet `index` has a material (`value`) that there is not.
+pub const BLIK_ERROR_MATERIAL_INDEX: i32 = 16;
+
+/// `field` of material `index` is out of range in `band`.
+pub const BLIK_ERROR_MATERIAL: i32 = 17;
+
+/// Diffuse and mirror reflectance of material `index` add up to more than 1 in `band`.
+pub const BLIK_ERROR_REFLECTANCE_SUM: i32 = 18;
+
+/// `field` is out of range (`value`, in `band`).
+pub const BLIK_ERROR_RANGE: i32 = 19;
+
+/// The direction `field` is zero or not finite.
+pub const BLIK_ERROR_DIRECTION: i32 = 20;
+
+/// The camera's `field` coincides with the eye or is parallel to the viewing direction.
+pub const BLIK_ERROR_CAMERA: i32 = 21;
+
+/// The light grows without bound: a closed part of the scene reflects all of it.
+pub const BLIK_ERROR_DIVERGES: i32 = 22;
+
+/// The progress callback asked to stop.
+pub const BLIK_ERROR_CANCELLED: i32 = 23;
+
+/// The coupling kept no directions, which a sky that is not uniform needs.
+pub const BLIK_ERROR_NOT_DIRECTIONAL: i32 = 24;
+
+/// A baked block is damaged, of another version or byte order, or not a block.
+pub const BLIK_ERROR_BLOCK: i32 = 25;
+
+/// Memory does not start on the boundary that it must start on.
+pub const BLIK_ERROR_ALIGNMENT: i32 = 26;
+
+/// The system gave no memory.
+pub const BLIK_ERROR_MEMORY: i32 = 27;
+
+/// A fault of the library; please report it.
+pub const BLIK_ERROR_INTERNAL: i32 = 28;
+
+fn status_text(number: i32) -> &'static CStr {
+    match number {
+        BLIK_OK => c"done",
+        BLIK_ERROR_NULL => c"a pointer is null",
+        BLIK_ERROR_STRUCT_SIZE => c"struct_size is not set, or of another version",
+        BLIK_ERROR_CHOICE => c"a number stands for no choice",
+        BLIK_ERROR_HANDLE => c"a handle is not valid, or belongs to another scene",
+        BLIK_ERROR_BUFFER_TOO_SMALL => c"memory is too small",
+        BLIK_ERROR_LENGTH => c"an array has the wrong number of entries",
+        BLIK_ERROR_TOO_MANY => c"too many facets, elements or bytes",
+        BLIK_ERROR_NO_FACETS => c"the mesh has no facets",
+        BLIK_ERROR_NO_MATERIALS => c"the mesh has no materials",
+        BLIK_ERROR_BANDS => c"the number of bands is not in 1 to 64",
+        BLIK_ERROR_VERTEX => c"a vertex is not finite",
+        BLIK_ERROR_NORMAL => c"a vertex normal is zero or not finite",
+        BLIK_ERROR_EXTENT => c"the mesh is too large or too small",
+        BLIK_ERROR_VERTEX_INDEX => c"a vertex index is out of range",
+        BLIK_ERROR_NORMAL_INDEX => c"a normal index is out of range",
+        BLIK_ERROR_MATERIAL_INDEX => c"a material index is out of range",
+        BLIK_ERROR_MATERIAL => c"a material's value is out of range",
+        BLIK_ERROR_REFLECTANCE_SUM => c"diffuse and specular reflectance exceed 1 together",
+        BLIK_ERROR_RANGE => c"a value is out of range",
+        BLIK_ERROR_DIRECTION => c"a direction is zero or not finite",
+        BLIK_ERROR_CAMERA => c"the camera's target is its eye, or its up is parallel to its direction",
+        BLIK_ERROR_DIVERGES => c"the interreflections diverge: a closed part reflects all light",
+        BLIK_ERROR_CANCELLED => c"cancelled",
+        BLIK_ERROR_NOT_DIRECTIONAL => c"the coupling was made without directions, which this sky needs",
+        BLIK_ERROR_BLOCK => c"the baked block is damaged, of another version, or none",
+        BLIK_ERROR_ALIGNMENT => c"memory is not aligned",
+        BLIK_ERROR_MEMORY => c"out of memory",
+        BLIK_ERROR_INTERNAL => c"internal error",
+        _ => c"unknown status",
+    }
+}
+
+/// No field.
+pub const BLIK_FIELD_NONE: i32 = 0;
+
+/// Diffuse reflectance of a material.
+pub const BLIK_FIELD_DIFFUSE: i32 = 1;
+
+/// Mirror reflectance of a material.
+pub const BLIK_FIELD_SPECULAR: i32 = 2;
+
+/// Emission of a material, or of the whole scene where radiances exceed 1e37.
+pub const BLIK_FIELD_EMISSION: i32 = 3;
+
+/// Axis ratio of a material's lobe.
+pub const BLIK_FIELD_GLOSS_AXIS_RATIO: i32 = 4;
+
+/// Rays of a material's lobe.
+pub const BLIK_FIELD_GLOSS_RAYS: i32 = 5;
+
+/// The tolerance.
+pub const BLIK_FIELD_TOLERANCE: i32 = 6;
+
+/// The reference radiance.
+pub const BLIK_FIELD_REFERENCE_RADIANCE: i32 = 7;
+
+/// Radiance of the sky.
+pub const BLIK_FIELD_SKY_RADIANCE: i32 = 8;
+
+/// Radiance of the ground.
+pub const BLIK_FIELD_SKY_GROUND: i32 = 9;
+
+/// The sky's up.
+pub const BLIK_FIELD_SKY_UP: i32 = 10;
+
+/// Type of the CIE sky.
+pub const BLIK_FIELD_SKY_CIE_TYPE: i32 = 11;
+
+/// Table of the sky.
+pub const BLIK_FIELD_SKY_TABLE: i32 = 12;
+
+/// The CIE sky's sun.
+pub const BLIK_FIELD_SKY_SUN_DIRECTION: i32 = 13;
+
+/// The table's azimuth 0.
+pub const BLIK_FIELD_SKY_AZIMUTH_ZERO: i32 = 14;
+
+/// Direction of the sun.
+pub const BLIK_FIELD_SUN_DIRECTION: i32 = 15;
+
+/// Irradiance of the sun.
+pub const BLIK_FIELD_SUN_IRRADIANCE: i32 = 16;
+
+/// Half angle of the sun.
+pub const BLIK_FIELD_SUN_HALF_ANGLE: i32 = 17;
+
+/// The camera's eye.
+pub const BLIK_FIELD_CAMERA_EYE: i32 = 18;
+
+/// The camera's target.
+pub const BLIK_FIELD_CAMERA_TARGET: i32 = 19;
+
+/// The camera's up.
+pub const BLIK_FIELD_CAMERA_UP: i32 = 20;
+
+/// The camera's height.
+pub const BLIK_FIELD_CAMERA_HEIGHT: i32 = 21;
+
+/// The camera's field of view.
+pub const BLIK_FIELD_CAMERA_FOV: i32 = 22;
+
+/// Columns or rows of the image.
+pub const BLIK_FIELD_RESOLUTION: i32 = 23;
+
+/// A direction given to the call.
+pub const BLIK_FIELD_DIRECTION: i32 = 24;
+
+/// A range of rows.
+pub const BLIK_FIELD_ROWS: i32 = 25;
+
+fn field_text(number: i32) -> &'static CStr {
+    match number {
+        BLIK_FIELD_NONE => c"",
+        BLIK_FIELD_DIFFUSE => c"diffuse",
+        BLIK_FIELD_SPECULAR => c"specular",
+        BLIK_FIELD_EMISSION => c"emission",
+        BLIK_FIELD_GLOSS_AXIS_RATIO => c"gloss_axis_ratio",
+        BLIK_FIELD_GLOSS_RAYS => c"gloss_rays",
+        BLIK_FIELD_TOLERANCE => c"tolerance",
+        BLIK_FIELD_REFERENCE_RADIANCE => c"reference_radiance",
+        BLIK_FIELD_SKY_RADIANCE => c"sky radiance",
+        BLIK_FIELD_SKY_GROUND => c"sky ground",
+        BLIK_FIELD_SKY_UP => c"sky up",
+        BLIK_FIELD_SKY_CIE_TYPE => c"sky cie_type",
+        BLIK_FIELD_SKY_TABLE => c"sky table",
+        BLIK_FIELD_SKY_SUN_DIRECTION => c"sky sun_direction",
+        BLIK_FIELD_SKY_AZIMUTH_ZERO => c"sky azimuth_zero",
+        BLIK_FIELD_SUN_DIRECTION => c"sun direction",
+        BLIK_FIELD_SUN_IRRADIANCE => c"sun irradiance",
+        BLIK_FIELD_SUN_HALF_ANGLE => c"sun half_angle_deg",
+        BLIK_FIELD_CAMERA_EYE => c"camera eye",
+        BLIK_FIELD_CAMERA_TARGET => c"camera target",
+        BLIK_FIELD_CAMERA_UP => c"camera up",
+        BLIK_FIELD_CAMERA_HEIGHT => c"camera height",
+        BLIK_FIELD_CAMERA_FOV => c"camera fov_deg",
+        BLIK_FIELD_RESOLUTION => c"camera columns or rows",
+        BLIK_FIELD_DIRECTION => c"direction",
+        BLIK_FIELD_ROWS => c"rows",
+        _ => c"",
+    }
+}
+
+/// What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
+/// to be set before.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct blik_error {
+    /// The status that the call returned.
+    pub status: i32,
+    /// The field that it is about, one of `BLIK_FIELD_*`.
+    pub field: i32,
+    /// Index of the facet, vertex, normal or material that it is about; else 0.
+    pub index: usize,
+    /// Spectral band; else 0.
+    pub band: usize,
+    /// The offending value; else 0.
+    pub value: f64,
+    /// Bytes or entries needed, or the limit; else 0.
+    pub needed: usize,
+    /// Bytes or entries given; else 0.
+    pub given: usize,
+}
+
+impl blik_error {
+    pub(crate) const fn of(status: i32) -> blik_error {
+        blik_error { status, field: 0, index: 0, band: 0, value: 0.0, needed: 0, given: 0 }
+    }
+
+    pub(crate) const fn field(self, field: i32) -> blik_error {
+        blik_error { field, ..self }
+    }
+
+    pub(crate) const fn sizes(self, needed: usize, given: usize) -> blik_error {
+        blik_error { needed, given, ..self }
+    }
+
+    pub(crate) const fn at(self, index: usize, band: usize, value: f64) -> blik_error {
+        blik_error { index, band, value, ..self }
+    }
+}
+
+impl From<Error> for blik_error {
+    fn from(error: Error) -> blik_error {
+        use blik_error as e;
+        match error {
+            Error::BufferTooSmall { needed, given } => {
+                e::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, given)
+            }
+            Error::Length { expected, given, .. } => e::of(BLIK_ERROR_LENGTH).sizes(expected, given),
+            Error::TooMany { limit, .. } => e::of(BLIK_ERROR_TOO_MANY).sizes(limit, 0),
+            Error::NoFacets => e::of(BLIK_ERROR_NO_FACETS),
+            Error::NoMaterials => e::of(BLIK_ERROR_NO_MATERIALS),
+            Error::Bands { given } => e::of(BLIK_ERROR_BANDS).sizes(64, given),
+            Error::VertexNotFinite { vertex } => e::of(BLIK_ERROR_VERTEX).at(vertex, 0, 0.0),
+            Error::NormalNotFinite { normal } => e::of(BLIK_ERROR_NORMAL).at(normal, 0, 0.0),
+            Error::Extent => e::of(BLIK_ERROR_EXTENT),
+            Error::IndexOutOfRange { facet, index, .. } => {
+                e::of(BLIK_ERROR_VERTEX_INDEX).at(facet, 0, index as f64)
+            }
+            Error::NormalIndexOutOfRange { facet, index, .. } => {
+                e::of(BLIK_ERROR_NORMAL_INDEX).at(facet, 0, index as f64)
+            }
+            Error::MaterialOutOfRange { facet, material, .. } => {
+                e::of(BLIK_ERROR_MATERIAL_INDEX).at(facet, 0, material as f64)
+            }
+            Error::BandCount { material, field, expected, given } => {
+                let error = e::of(BLIK_ERROR_LENGTH).at(material, 0, 0.0);
+                error.field(number(field)).sizes(expected, given)
+            }
+            Error::MaterialRange { material, band, field, value } => {
+                e::of(BLIK_ERROR_MATERIAL).field(number(field)).at(material, band, value)
+            }
+            Error::ReflectanceSum { material, band, sum } => {
+                e::of(BLIK_ERROR_REFLECTANCE_SUM).at(material, band, sum)
+            }
+            Error::LightBandCount { field, expected, given } => {
+                e::of(BLIK_ERROR_LENGTH).field(number(field)).sizes(expected, given)
+            }
+            Error::Range { field, band, value } => {
+                e::of(BLIK_ERROR_RANGE).field(number(field)).at(0, band, value)
+            }
+            Error::Direction { field } => e::of(BLIK_ERROR_DIRECTION).field(number(field)),
+            Error::CameraFrame { field } => e::of(BLIK_ERROR_CAMERA).field(number(field)),
+            Error::Mismatch { what: "coupling without directions" } => e::of(BLIK_ERROR_NOT_DIRECTIONAL),
+            Error::Mismatch { .. } => e::of(BLIK_ERROR_HANDLE),
+            Error::Diverges { row_sum } => e::of(BLIK_ERROR_DIVERGES).at(0, 0, row_sum),
+            Error::Cancelled => e::of(BLIK_ERROR_CANCELLED),
+            Error::Block => e::of(BLIK_ERROR_BLOCK),
+            _ => e::of(BLIK_ERROR_INTERNAL),
+        }
+    }
+}
+
+fn number(field: Field) -> i32 {
+    match field {
+        Field::Diffuse => BLIK_FIELD_DIFFUSE,
+        Field::Specular => BLIK_FIELD_SPECULAR,
+        Field::Emission => BLIK_FIELD_EMISSION,
+        Field::AxisRatio => BLIK_FIELD_GLOSS_AXIS_RATIO,
+        Field::GlossRays => BLIK_FIELD_GLOSS_RAYS,
+        Field::Tolerance => BLIK_FIELD_TOLERANCE,
+        Field::ReferenceRadiance => BLIK_FIELD_REFERENCE_RADIANCE,
+        Field::SkyRadiance => BLIK_FIELD_SKY_RADIANCE,
+        Field::SkyGround => BLIK_FIELD_SKY_GROUND,
+        Field::SkyUp => BLIK_FIELD_SKY_UP,
+        Field::SkyType => BLIK_FIELD_SKY_CIE_TYPE,
+        Field::SkyTable => BLIK_FIELD_SKY_TABLE,
+        Field::SkySunDirection => BLIK_FIELD_SKY_SUN_DIRECTION,
+        Field::SkyAzimuthZero => BLIK_FIELD_SKY_AZIMUTH_ZERO,
+        Field::SunDirection => BLIK_FIELD_SUN_DIRECTION,
+        Field::SunIrradiance => BLIK_FIELD_SUN_IRRADIANCE,
+        Field::SunHalfAngle => BLIK_FIELD_SUN_HALF_ANGLE,
+        Field::CameraEye => BLIK_FIELD_CAMERA_EYE,
+        Field::CameraTarget => BLIK_FIELD_CAMERA_TARGET,
+        Field::CameraUp => BLIK_FIELD_CAMERA_UP,
+        Field::CameraHeight => BLIK_FIELD_CAMERA_HEIGHT,
+        Field::CameraFieldOfView => BLIK_FIELD_CAMERA_FOV,
+        Field::Resolution => BLIK_FIELD_RESOLUTION,
+        Field::Direction => BLIK_FIELD_DIRECTION,
+        Field::Rows => BLIK_FIELD_ROWS,
+        _ => BLIK_FIELD_NONE,
+    }
+}
+
+/// The words for a status: never null, never to be freed. May be called by any number of threads at once.
+#[unsafe(no_mangle)]
+pub extern "C" fn blik_status_text(status: i32) -> *const c_char {
+    status_text(status).as_ptr()
+}
+
+/// The name of a field as the structs spell it: never null, never to be freed; empty for no field. May be called by
+/// any number of threads at once.
+#[unsafe(no_mangle)]
+pub extern "C" fn blik_field_text(field: i32) -> *const c_char {
+    field_text(field).as_ptr()
+}

@@ -1,0 +1,372 @@
+//! What callers hand over: plain structs, each with a function that sets its defaults.
+
+use crate::status::*;
+use core::ffi::c_void;
+use core::ptr::null;
+
+/// Numbers of [`blik_array`]: 32-bit floating point.
+pub const BLIK_F32: i32 = 1;
+/// Numbers of [`blik_array`]: 64-bit floating point.
+pub const BLIK_F64: i32 = 2;
+/// Numbers of [`blik_array`]: unsigned, 8 bits.
+pub const BLIK_U8: i32 = 3;
+/// Numbers of [`blik_array`]: unsigned, 16 bits.
+pub const BLIK_U16: i32 = 4;
+/// Numbers of [`blik_array`]: unsigned, 32 bits.
+pub const BLIK_U32: i32 = 5;
+
+/// "No vertex normal" among the indices of normals.
+pub const BLIK_NO_NORMAL: u32 = 0xffff_ffff;
+
+/// An array as the caller keeps it: entries `stride` bytes apart, each of as many numbers as its use needs, packed.
+/// `count` 0: absent.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_array {
+    /// First entry, aligned as its numbers need; not read when `count` is 0.
+    pub data: *const c_void,
+    /// Number of entries.
+    pub count: usize,
+    /// Bytes from one entry to the next; 0: the size of an entry.
+    pub stride: usize,
+    /// `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16` or `BLIK_U32`.
+    pub format: i32,
+}
+
+impl blik_array {
+    pub(crate) const NONE: blik_array = blik_array { data: null(), count: 0, stride: 0, format: 0 };
+}
+
+/// Reflectances and emission of one material, one value per band each; a null pointer stands for zeros.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_material {
+    /// Diffuse reflectance, in [0, 1].
+    pub diffuse: *const f64,
+    /// Mirror reflectance, in [0, 1]; diffuse + specular <= 1. With gloss: the lobe's albedo at normal view.
+    pub specular: *const f64,
+    /// Own diffuse radiance, >= 0, W m-2 sr-1.
+    pub emission: *const f64,
+    /// 0: an ideal mirror; else long over short axis of the lobe, >= 1 (1e4 and above: an ideal mirror).
+    pub gloss_axis_ratio: f64,
+    /// Rays at the first hit of the lobe, up to 65536; 0: by tolerance.
+    pub gloss_rays: u32,
+}
+
+/// A mesh with its materials. Set by [`blik_mesh_init`] first. Read during the call only.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_mesh {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// Positions: three `BLIK_F64` or `BLIK_F32` each, in any unit and at any offset.
+    pub vertices: blik_array,
+    /// Three vertex indices (`BLIK_U32` or `BLIK_U16`) a facet, counter-clockwise seen from the front.
+    pub facets: blik_array,
+    /// Material of each facet (`BLIK_U32`, `BLIK_U16` or `BLIK_U8`); absent: all 0.
+    pub facet_materials: blik_array,
+    /// Normals for interpolated mirror directions, three `BLIK_F64` or `BLIK_F32` each; absent: mirrors are flat.
+    pub normals: blik_array,
+    /// Three normal indices a facet, or `BLIK_NO_NORMAL` (`BLIK_U32`); absent: as `facets`.
+    pub facet_normals: blik_array,
+    /// The materials.
+    pub materials: *const blik_material,
+    /// Number of materials, at least 1.
+    pub material_count: usize,
+    /// Bytes from one material to the next; set by the init function.
+    pub material_stride: usize,
+    /// Spectral bands, 1 to 64; default 1.
+    pub bands: usize,
+    /// Not 0: both sides carry material and emission; default 0: backs are black and opaque.
+    pub two_sided: i32,
+}
+
+/// What decides the coupling besides the scene. Set by [`blik_settings_init`] first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_settings {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// The wanted error of an image, eq. 16 of the paper, relative to the reference radiance: 1e-6 to 0.1; default
+    /// 2e-3.
+    pub tolerance: f64,
+    /// Light reflected more often does not count; below 0 (default): by tolerance.
+    pub max_bounces: i32,
+    /// Not 0: irradiance of all facets is wanted, also of those that reflect nothing diffusely; default 0.
+    pub all_irradiances: i32,
+    /// Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
+    pub directional: i32,
+}
+
+/// [`blik_sky`]: the same radiance from the whole sphere.
+pub const BLIK_SKY_UNIFORM: i32 = 0;
+/// [`blik_sky`]: the same radiance from above the horizon.
+pub const BLIK_SKY_HEMISPHERE: i32 = 1;
+/// [`blik_sky`]: radiance (1 + 2 sin(elevation))/3.
+pub const BLIK_SKY_OVERCAST: i32 = 2;
+/// [`blik_sky`]: one of the fifteen types of ISO 15469.
+pub const BLIK_SKY_CIE: i32 = 3;
+/// [`blik_sky`]: linear in the height from ground (nadir) to radiance (zenith).
+pub const BLIK_SKY_GRADIENT: i32 = 4;
+/// [`blik_sky`]: samples by elevation and azimuth.
+pub const BLIK_SKY_TABLE: i32 = 5;
+
+/// A sky. Set by [`blik_sky_init`] first. Read during the call only: its arrays are copied.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_sky {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// `BLIK_SKY_*`; default uniform.
+    pub model: i32,
+    /// 1 to 15: the type of a CIE sky; default 1.
+    pub cie_type: u32,
+    /// Radiance per band as the model uses it (for a table a factor), W m-2 sr-1; null (default): 1.
+    pub radiance: *const f64,
+    /// Radiance below the horizon per band; null (default): 0.
+    pub ground: *const f64,
+    /// Toward the zenith, of any length but zero; default (0, 0, 1).
+    pub up: [f64; 3],
+    /// Toward the sun of a CIE sky, above the horizon.
+    pub sun_direction: [f64; 3],
+    /// Samples of a table: `table_rows` x `table_columns` x `table_bands`, row by row from the zenith down, columns
+    /// counter-clockwise seen from above; bilinear between the centres.
+    pub table: *const f32,
+    /// Steps of elevation.
+    pub table_rows: usize,
+    /// Steps of azimuth.
+    pub table_columns: usize,
+    /// 1, or the scene's number of bands; default 1.
+    pub table_bands: usize,
+    /// Azimuth 0 of a table, projected off `up`; zeros (default): (1, 0, 0), or (0, 1, 0) where that is up.
+    pub table_azimuth_zero: [f64; 3],
+}
+
+/// The sun. Set by [`blik_sun_init`] first. Read during the call only.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_sun {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// Toward the centre of the sun, of any length but zero; default (0, 0, 1).
+    pub direction: [f64; 3],
+    /// Irradiance per band of an unshaded plane that faces the sun, W m-2; null (default): pi.
+    pub irradiance: *const f64,
+    /// Angular radius in degrees: 0 (a point) or 1e-4 to 10; default 0.2665.
+    pub half_angle_deg: f64,
+}
+
+/// The light of a scene. Set by [`blik_light_init`] first. Read during the call only.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_light {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// The sky; null (default): none.
+    pub sky: *const blik_sky,
+    /// The sun; null (default): none.
+    pub sun: *const blik_sun,
+    /// The radiance per band to which errors are related; null (default): from the light.
+    pub reference_radiance: *const f64,
+}
+
+/// [`blik_camera`]: parallel rays.
+pub const BLIK_ORTHOGRAPHIC: i32 = 0;
+/// [`blik_camera`]: rays through the eye.
+pub const BLIK_PERSPECTIVE: i32 = 1;
+/// [`blik_camera`]: mean radiance over the pixel's square, background included.
+pub const BLIK_SAMPLE_AREA: i32 = 0;
+/// [`blik_camera`]: radiance along the ray through the pixel's centre.
+pub const BLIK_SAMPLE_CENTRE: i32 = 1;
+
+/// A camera. Set by [`blik_camera_init`] first. Row 0 is the top; nothing before the eye is seen.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_camera {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// `BLIK_ORTHOGRAPHIC` (default) or `BLIK_PERSPECTIVE`.
+    pub projection: i32,
+    /// `BLIK_SAMPLE_AREA` (default) or `BLIK_SAMPLE_CENTRE`.
+    pub sampling: i32,
+    /// Position of the eye, in the mesh's coordinates.
+    pub eye: [f64; 3],
+    /// The point in the image's middle.
+    pub target: [f64; 3],
+    /// What is up in the image; default (0, 0, 1).
+    pub up: [f64; 3],
+    /// Orthographic: height of the image in the mesh's unit.
+    pub height: f64,
+    /// Perspective: vertical field of view in degrees.
+    pub fov_deg: f64,
+    /// Pixels across, 1 to 65536.
+    pub columns: usize,
+    /// Pixels down, 1 to 65536.
+    pub rows: usize,
+}
+
+/// Structs whose first member tells their size.
+pub(crate) trait Sized_: Copy {
+    fn struct_size(&self) -> usize;
+}
+
+macro_rules! sized {
+    ($($name:ident),*) => { $(
+        impl Sized_ for $name {
+            fn struct_size(&self) -> usize {
+                self.struct_size
+            }
+        }
+    )* };
+}
+sized!(blik_mesh, blik_settings, blik_sky, blik_sun, blik_light, blik_camera);
+pub(crate) use sized;
+
+/// Reads a struct of the caller.
+///
+/// # Safety
+/// `at` is null or points to a size that is followed by as many bytes as it says.
+pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
+    if at.is_null() {
+        return Err(blik_error::of(BLIK_ERROR_NULL));
+    }
+    if !at.is_aligned() {
+        return Err(blik_error::of(BLIK_ERROR_ALIGNMENT));
+    }
+    // SAFETY: not null, aligned, and by the caller's promise at least a size.
+    let given = unsafe { at.cast::<usize>().read() };
+    if given != size_of::<T>() {
+        return Err(blik_error::of(BLIK_ERROR_STRUCT_SIZE).sizes(size_of::<T>(), given));
+    }
+    // SAFETY: the struct is as long as T.
+    let value = unsafe { at.read() };
+    debug_assert_eq!(value.struct_size(), given);
+    Ok(value)
+}
+
+/// Sets a struct's defaults; nothing where the pointer is null.
+unsafe fn set<T>(at: *mut T, value: T) {
+    if !at.is_null() && at.is_aligned() {
+        // SAFETY: by the caller's promise there is room for a T.
+        unsafe { at.write(value) };
+    }
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `mesh` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_mesh_init(mesh: *mut blik_mesh) {
+    let none = blik_array::NONE;
+    let value = blik_mesh {
+        struct_size: size_of::<blik_mesh>(),
+        vertices: blik_array { format: BLIK_F64, ..none },
+        facets: blik_array { format: BLIK_U32, ..none },
+        facet_materials: blik_array { format: BLIK_U32, ..none },
+        normals: blik_array { format: BLIK_F64, ..none },
+        facet_normals: blik_array { format: BLIK_U32, ..none },
+        materials: null(),
+        material_count: 0,
+        material_stride: size_of::<blik_material>(),
+        bands: 1,
+        two_sided: 0,
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(mesh, value) };
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `settings` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_settings_init(settings: *mut blik_settings) {
+    let value = blik_settings {
+        struct_size: size_of::<blik_settings>(),
+        tolerance: 2e-3,
+        max_bounces: -1,
+        all_irradiances: 0,
+        directional: 1,
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(settings, value) };
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `sky` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_sky_init(sky: *mut blik_sky) {
+    let value = blik_sky {
+        struct_size: size_of::<blik_sky>(),
+        model: BLIK_SKY_UNIFORM,
+        cie_type: 1,
+        radiance: null(),
+        ground: null(),
+        up: [0.0, 0.0, 1.0],
+        sun_direction: [0.0; 3],
+        table: null(),
+        table_rows: 0,
+        table_columns: 0,
+        table_bands: 1,
+        table_azimuth_zero: [0.0; 3],
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(sky, value) };
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `sun` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_sun_init(sun: *mut blik_sun) {
+    let value = blik_sun {
+        struct_size: size_of::<blik_sun>(),
+        direction: [0.0, 0.0, 1.0],
+        irradiance: null(),
+        half_angle_deg: 0.2665,
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(sun, value) };
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `light` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_light_init(light: *mut blik_light) {
+    let value = blik_light {
+        struct_size: size_of::<blik_light>(),
+        sky: null(),
+        sun: null(),
+        reference_radiance: null(),
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(light, value) };
+}
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `camera` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_camera_init(camera: *mut blik_camera) {
+    let value = blik_camera {
+        struct_size: size_of::<blik_camera>(),
+        projection: BLIK_ORTHOGRAPHIC,
+        sampling: BLIK_SAMPLE_AREA,
+        eye: [0.0; 3],
+        target: [0.0; 3],
+        up: [0.0, 0.0, 1.0],
+        height: 0.0,
+        fov_deg: 0.0,
+        columns: 0,
+        rows: 0,
+    };
+    // SAFETY: by the caller's promise.
+    unsafe { set(camera, value) };
+}

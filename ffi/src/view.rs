@@ -1,0 +1,516 @@
+//! Views of a solved scene: images, rays, signatures, facets.
+
+use crate::call;
+use crate::memory::*;
+use crate::run::{Runner, Start, blik_run};
+use crate::scene::blik_ray;
+use crate::solution::blik_solution;
+use crate::status::*;
+use crate::types::*;
+use blik_kernel::arena::ALIGNMENT;
+use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
+use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::image::{self, Tally, Target};
+use blik_kernel::math::Vec3;
+use blik_kernel::ray::Ray;
+use blik_kernel::scene::{MAX_BANDS, Scene};
+use blik_kernel::signature::{self, Signature, Sums, View};
+use blik_kernel::{facets, policy};
+use core::ffi::c_void;
+use core::ops::Range;
+
+/// What was done on rows of an image; tallies of all its rows add up by [`blik_tally_add`].
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct blik_tally {
+    /// Pixels whose centre ray meets the object.
+    pub object_pixels: u64,
+    /// Rays through pixels.
+    pub primary_rays: u64,
+    /// Rays of chains and toward the sun.
+    pub chain_rays: u64,
+    /// Pixels sampled more than once.
+    pub refined_pixels: u64,
+    /// Sum over object pixels of the squared expected error from the diffuse solution.
+    pub noise_squared: f64,
+    /// The same of the error from sampling the pixel's area.
+    pub sampling_squared: f64,
+    /// Largest bound on what cut chains could still have brought.
+    pub chain_tail: f64,
+}
+
+impl blik_tally {
+    fn new(tally: &Tally) -> blik_tally {
+        blik_tally {
+            object_pixels: tally.object_pixels,
+            primary_rays: tally.primary,
+            chain_rays: tally.chain,
+            refined_pixels: tally.refined,
+            noise_squared: tally.noise2,
+            sampling_squared: tally.sampling2,
+            chain_tail: tally.tail,
+        }
+    }
+
+    pub(crate) fn kernel(&self) -> Tally {
+        Tally {
+            object_pixels: self.object_pixels,
+            primary: self.primary_rays,
+            chain: self.chain_rays,
+            refined: self.refined_pixels,
+            noise2: self.noise_squared,
+            sampling2: self.sampling_squared,
+            tail: self.chain_tail,
+        }
+    }
+}
+
+/// Adds `next` to `sum`; nothing where either is null.
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_tally_add(sum: *mut blik_tally, next: *const blik_tally) {
+    if let (Ok(sum), Ok(next)) = (needed(sum), needed(next.cast_mut())) {
+        // SAFETY: not null, and valid by the caller's promise.
+        unsafe {
+            let mut all = sum.read().kernel();
+            all.add(&next.read().kernel());
+            sum.write(blik_tally::new(&all));
+        }
+    }
+}
+
+/// The kernel's camera.
+///
+/// # Safety
+/// As for [`read`].
+unsafe fn camera(camera: *const blik_camera, scene: &Scene<'_>) -> Result<Camera, blik_error> {
+    // SAFETY: by the caller's promise.
+    let camera = unsafe { read(camera) }?;
+    let choice = |number: i32| blik_error::of(BLIK_ERROR_CHOICE).at(0, 0, f64::from(number));
+    let projection = match camera.projection {
+        BLIK_ORTHOGRAPHIC => Projection::Orthographic { height: camera.height },
+        BLIK_PERSPECTIVE => Projection::Perspective { fov_deg: camera.fov_deg },
+        other => return Err(choice(other)),
+    };
+    let sampling = match camera.sampling {
+        BLIK_SAMPLE_AREA => Sampling::Area,
+        BLIK_SAMPLE_CENTRE => Sampling::Centre,
+        other => return Err(choice(other)),
+    };
+    let (eye, target, up) = (camera.eye, camera.target, camera.up);
+    let (columns, rows) = (camera.columns, camera.rows);
+    Ok(Camera::new(&CameraInput { projection, eye, target, up, columns, rows, sampling }, scene)?)
+}
+
+/// Rows of one piece of an image: the same for any number of threads, so that sums over pixels are the same too.
+fn piece(rows: usize) -> usize {
+    rows.div_ceil(128).max(4)
+}
+
+/// Bytes of one lane's scratch memory, and of the tallies before them.
+fn scratch_parts(camera: &Camera, bands: usize) -> Result<(usize, usize), blik_error> {
+    let lane = image::scratch_bytes(camera, bands)?.next_multiple_of(ALIGNMENT);
+    let tallies = camera.rows().div_ceil(piece(camera.rows())) * size_of::<Tally>();
+    Ok((tallies.next_multiple_of(ALIGNMENT) + ALIGNMENT, lane))
+}
+
+/// Bytes of scratch memory with which [`blik_image`] keeps all lanes of `run` busy.
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_image_scratch_size(
+    solution: *const blik_solution,
+    camera: *const blik_camera,
+    run: *const blik_run,
+    error: *mut blik_error,
+    bytes: *mut usize,
+) -> i32 {
+    call(error, || {
+        let to = needed(bytes)?;
+        // SAFETY: by the caller's promise.
+        let (solution, runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
+        // SAFETY: by the caller's promise.
+        let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
+        let (fixed, lane) = scratch_parts(&camera, solution.shape.bands)?;
+        // SAFETY: not null.
+        unsafe { to.write(fixed + lane * runner.lanes()) };
+        Ok(())
+    })
+}
+
+/// Where pixels go.
+struct Out<'a> {
+    pixels: &'a mut [f32],
+    components: [&'a mut [f32]; 3],
+}
+
+impl Out<'_> {
+    /// # Safety
+    /// Arrays have as many entries as said, `components` three times as many, or none.
+    unsafe fn new<'a>(
+        pixels: *mut f32,
+        count: usize,
+        components: *mut f32,
+        expected: usize,
+    ) -> Result<Out<'a>, blik_error> {
+        if count != expected {
+            return Err(blik_error::of(BLIK_ERROR_LENGTH).sizes(expected, count));
+        }
+        // SAFETY: by the caller's promise.
+        let pixels = unsafe { output(pixels, count) }?;
+        if components.is_null() {
+            return Ok(Out { pixels, components: [&mut [], &mut [], &mut []] });
+        }
+        // SAFETY: by the caller's promise.
+        let all = unsafe { output(components, 3 * count) }?;
+        let parts = all.split_at_mut_checked(count).and_then(|(a, rest)| {
+            let (b, c) = rest.split_at_mut_checked(count)?;
+            Some([a, b, c])
+        });
+        let components = parts.ok_or(blik_error::of(BLIK_ERROR_INTERNAL))?;
+        Ok(Out { pixels, components })
+    }
+}
+
+/// The whole image that a camera sees: `pixels` holds rows x columns x bands values, row 0 at the top, bands innermost,
+/// and `count` is their number. `components` is null or has room for three such images, the terms of eq. (11): diffuse,
+/// mirrored sky, mirrored diffuse. `tally` may be null.
+///
+/// `scratch` is memory of [`blik_image_scratch_size`] bytes, or less, for fewer lanes; with the standard library it may
+/// be null, and is then taken from the heap. Bits do not depend on `run`. A call that is cancelled leaves part of the
+/// pixels written.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_image(
+    solution: *const blik_solution,
+    camera: *const blik_camera,
+    run: *const blik_run,
+    scratch: *mut c_void,
+    scratch_size: usize,
+    error: *mut blik_error,
+    pixels: *mut f32,
+    count: usize,
+    components: *mut f32,
+    tally: *mut blik_tally,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
+        // SAFETY: by the caller's promise.
+        let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
+        let bands = solution.shape.bands;
+        // SAFETY: by the caller's promise.
+        let mut out =
+            unsafe { Out::new(pixels, count, components, camera.rows() * camera.columns() * bands) }?;
+        // SAFETY: by the caller's promise.
+        let given = unsafe { bytes(scratch, if scratch.is_null() { 0 } else { scratch_size }) }?;
+        #[cfg(feature = "std")]
+        let mut own = None;
+        #[cfg(feature = "std")]
+        let given = if scratch.is_null() {
+            let (fixed, lane) = scratch_parts(&camera, bands)?;
+            let slab: &mut Slab = own.insert(Slab::new(fixed + lane * runner.lanes())?);
+            // SAFETY: the slab lives until the end of this call.
+            unsafe { slab.bytes_mut() }
+        } else {
+            given
+        };
+        let sum = paint(solution, &camera, &mut out, given, &mut runner)?;
+        if let Ok(to) = needed(tally) {
+            // SAFETY: not null.
+            unsafe { to.write(blik_tally::new(&sum)) };
+        }
+        Ok(())
+    })
+}
+
+/// Computes all rows in pieces, as many at once as the scratch memory has room for.
+fn paint(
+    solution: &blik_solution,
+    camera: &Camera,
+    out: &mut Out<'_>,
+    scratch: &mut [u8],
+    runner: &mut Runner,
+) -> Result<Tally, blik_error> {
+    let (rows, bands) = (camera.rows(), solution.shape.bands);
+    let (fixed, lane_size) = scratch_parts(camera, bands)?;
+    let lanes = scratch.len().saturating_sub(fixed) / lane_size.max(1);
+    if lanes == 0 {
+        return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(fixed + lane_size, scratch.len()));
+    }
+    let (front, buffers) = scratch.split_at_mut(fixed.min(scratch.len()));
+    let skip = front.as_ptr().align_offset(align_of::<Tally>());
+    let tallies = Start(front.as_mut_ptr().wrapping_add(skip).cast::<Tally>());
+    let (buffers, piece) = (Start(buffers.as_mut_ptr()), piece(rows));
+    let items = rows.div_ceil(piece);
+    let stride = camera.columns() * bands;
+    let solved = solution.solved();
+    let pixels = Start(out.pixels.as_mut_ptr());
+    let [a, b, c] = &mut out.components;
+    let with = !a.is_empty();
+    let parts = [a, b, c].map(|part| Start(part.as_mut_ptr()));
+    runner.each(items, lanes.min(runner.lanes()), 1.0, &|lane, item| {
+        let range = item * piece..((item + 1) * piece).min(rows);
+        let size = range.len() * stride;
+        // SAFETY: every item is handed out once, so that parts of the image are disjoint; a lane's buffer is used by
+        // that lane alone, and there are as many tallies as items.
+        unsafe {
+            let own = |start: &Start<f32>, size| {
+                let at = if size > 0 { range.start * stride } else { 0 };
+                core::slice::from_raw_parts_mut(start.at(at), size)
+            };
+            let part = if with { size } else { 0 };
+            let components = parts.each_ref().map(|start| own(start, part));
+            let mut target = Target { image: own(&pixels, size), components };
+            let buffer = core::slice::from_raw_parts_mut(buffers.at(lane * lane_size), lane_size);
+            let tally = image::rows(&solved, camera, range, &mut target, buffer)?;
+            tallies.at(item).write(tally);
+        }
+        Ok(())
+    })?;
+    let mut sum = Tally::default();
+    for item in 0..items {
+        // SAFETY: written by the item.
+        sum.add(&unsafe { tallies.at(item).read() });
+    }
+    Ok(sum)
+}
+
+/// Rows `first` .. `first + rows` of the image that a camera sees, for schedulers and processes of the caller: `pixels`
+/// holds rows x columns x bands values. However an image is split into rows, its bits are the same. `scratch` as for
+/// [`blik_image`], of one lane; `components` and `tally` as there.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_image_rows(
+    solution: *const blik_solution,
+    camera: *const blik_camera,
+    first: usize,
+    rows: usize,
+    scratch: *mut c_void,
+    scratch_size: usize,
+    error: *mut blik_error,
+    pixels: *mut f32,
+    count: usize,
+    components: *mut f32,
+    tally: *mut blik_tally,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let solution: &blik_solution = unsafe { object(solution) }?;
+        // SAFETY: by the caller's promise.
+        let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
+        let bands = solution.shape.bands;
+        let range = rows_of(first, rows, camera.rows())?;
+        let expected = rows * camera.columns() * bands;
+        // SAFETY: by the caller's promise.
+        let out = unsafe { Out::new(pixels, count, components, expected) }?;
+        // SAFETY: by the caller's promise.
+        let given = unsafe { bytes(scratch, if scratch.is_null() { 0 } else { scratch_size }) }?;
+        #[cfg(feature = "std")]
+        let mut own = None;
+        #[cfg(feature = "std")]
+        let given = if scratch.is_null() {
+            let slab: &mut Slab = own.insert(Slab::new(image::scratch_bytes(&camera, bands)?)?);
+            // SAFETY: the slab lives until the end of this call.
+            unsafe { slab.bytes_mut() }
+        } else {
+            given
+        };
+        let mut target = Target { image: out.pixels, components: out.components };
+        let sum = image::rows(&solution.solved(), &camera, range, &mut target, given)?;
+        if let Ok(to) = needed(tally) {
+            // SAFETY: not null.
+            unsafe { to.write(blik_tally::new(&sum)) };
+        }
+        Ok(())
+    })
+}
+
+fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usize>, blik_error> {
+    match first.checked_add(rows) {
+        Some(end) if end <= all => Ok(first..end),
+        _ => Err(blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_ROWS).at(0, 0, first as f64)),
+    }
+}
+
+/// Radiance against each of `count` rays of any origin and direction: `radiance` has one value per band for each.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_radiance(
+    solution: *const blik_solution,
+    rays: *const blik_ray,
+    count: usize,
+    run: *const blik_run,
+    error: *mut blik_error,
+    radiance: *mut f64,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
+        let bands = solution.shape.bands;
+        let all = count.checked_mul(bands).ok_or(blik_error::of(BLIK_ERROR_TOO_MANY))?;
+        // SAFETY: by the caller's promise.
+        let (rays, out) = unsafe { (input(rays, count)?, output(radiance, all)?) };
+        let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
+        runner.rows(out, bands, 1.0, |range, out| {
+            let mut terms = Terms::ZERO;
+            let own = (range.start..).zip(rays.iter().skip(range.start));
+            for (out, (index, ray)) in out.chunks_exact_mut(bands.max(1)).zip(own) {
+                terms.clear(bands);
+                let ray = Ray {
+                    origin: scene.to_scene(Vec3::from_array(ray.origin)),
+                    direction: Vec3::from_array(ray.direction),
+                    t_max: ray.t_max * scene.scale(),
+                    skip: ray.skip,
+                };
+                solved.radiance(&ray, Sample::Alone(index as u32), &mut terms);
+                out.iter_mut().enumerate().for_each(|(band, l)| *l = terms.sum(band));
+            }
+            Ok(())
+        })
+    })
+}
+
+/// What a distant observer measures in one direction and band.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_signature {
+    /// Radiant intensity toward the observer, W/sr.
+    pub radiant_intensity: f64,
+    /// Area of the object's projection, in the square of the mesh's unit.
+    pub projected_area: f64,
+    /// Radiant intensity over projected area; 0 where nothing is seen.
+    pub mean_radiance: f64,
+    /// Radiance of the sky behind.
+    pub background: f64,
+    /// (mean radiance - background)/background; 0 where the background is 0.
+    pub contrast: f64,
+}
+
+/// What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
+/// from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
+/// one ray each; 0: by tolerance. Views are shared out over the lanes of `run`.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_signatures(
+    solution: *const blik_solution,
+    directions: *const f64,
+    views: usize,
+    cells: usize,
+    run: *const blik_run,
+    error: *mut blik_error,
+    signatures: *mut blik_signature,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
+        let bands = solution.shape.bands;
+        let too_many = blik_error::of(BLIK_ERROR_TOO_MANY);
+        let (all, numbers) =
+            (views.checked_mul(bands).ok_or(too_many)?, views.checked_mul(3).ok_or(too_many)?);
+        // SAFETY: by the caller's promise.
+        let (directions, out) = unsafe { (input(directions, numbers)?, output(signatures, all)?) };
+        let cells =
+            if cells == 0 { policy::signature_cells(solution.coupling.settings.tolerance) } else { cells };
+        let out = Start(out.as_mut_ptr());
+        let lanes = runner.lanes();
+        runner.each(views, lanes, 1.0, &|_, view| {
+            let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
+            // SAFETY: every view is handed out once, and its entries lie within the array.
+            let out = unsafe { core::slice::from_raw_parts_mut(out.at(view * bands), bands) };
+            measure(solution, Vec3::from_array(direction.unwrap_or_default()), cells, out)
+        })
+    })
+}
+
+fn measure(
+    solution: &blik_solution,
+    forward: Vec3,
+    cells: usize,
+    out: &mut [blik_signature],
+) -> Result<(), blik_error> {
+    let solved = solution.solved();
+    let view = View::new(&solved, forward, cells)?;
+    let (mut sums, mut row) = (Sums::ZERO, [Sums::ZERO]);
+    for at in 0..view.rows() {
+        signature::rows(&solved, &view, at..at + 1, &mut row)?;
+        row.iter().for_each(|row| sums.add(row));
+    }
+    let mut all = [0.0; MAX_BANDS];
+    let (background, _) = all.split_at_mut(out.len().min(MAX_BANDS));
+    if let Some(sky) = &solution.light.sky {
+        sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), background);
+    }
+    for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
+        let own = Signature::new(&sums, band, background);
+        *out = blik_signature {
+            radiant_intensity: own.intensity,
+            projected_area: sums.area,
+            mean_radiance: own.mean_radiance,
+            background,
+            contrast: own.contrast.unwrap_or(0.0),
+        };
+    }
+    Ok(())
+}
+
+/// Area, mean irradiance (all that arrives, not divided by pi) and diffuse radiance of facets `first` ..
+/// `first + count`: `areas` has one value a facet, `irradiance` and `radiance` one per facet, side and band, bands
+/// innermost. Any of the three may be null. Degenerate facets: zeros.
+///
+/// # Safety
+/// Pointers are null or valid, arrays as long as stated.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_facets(
+    solution: *const blik_solution,
+    first: usize,
+    count: usize,
+    error: *mut blik_error,
+    areas: *mut f64,
+    irradiance: *mut f64,
+    radiance: *mut f64,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let solution: &blik_solution = unsafe { object(solution) }?;
+        let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
+        let coupling = solution.coupling.matrix()?;
+        let (bands, sides) = (solution.shape.bands, scene.sides());
+        let range = rows_of(first, count, scene.facets())?;
+        let of = |at: *mut f64, size: usize| if at.is_null() { 0 } else { size };
+        let size = count * sides * bands;
+        // SAFETY: by the caller's promise.
+        let (areas, irradiance, radiance) = unsafe {
+            (
+                output(areas, of(areas, count))?,
+                output(irradiance, of(irradiance, size))?,
+                output(radiance, of(radiance, size))?,
+            )
+        };
+        for (area, facet) in areas.iter_mut().zip(range.clone()) {
+            *area = scene.area(facet);
+        }
+        let mut values = [[0.0; MAX_BANDS]; 2];
+        let [e, l] = values.each_mut().map(|all| all.split_at_mut(bands.min(MAX_BANDS)).0);
+        for (at, facet) in range.enumerate() {
+            for side in 0..sides {
+                facets::side(&solved, &coupling, solution.tables.sun, facet, side, e, l);
+                let start = (at * sides + side) * bands;
+                irradiance.iter_mut().skip(start).zip(&*e).for_each(|(to, from)| *to = *from);
+                radiance.iter_mut().skip(start).zip(&*l).for_each(|(to, from)| *to = *from);
+            }
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,503 @@
+/*
+ * Blik for C++17 and later: blik.h with owners, moves, containers and exceptions. Header only; adds no cost but the
+ * exception's message where a call is refused.
+ *
+ *     blik::mesh mesh(vertices, indices);                        // any containers: 3 numbers a vertex, 3 indices a facet
+ *     mesh.material({0.3}, {0.1});                               // diffuse, specular: one value per band
+ *     blik::scene scene(mesh);
+ *     blik::coupling coupling(scene, blik::settings(), blik::threads());
+ *     blik::solution solution(coupling, blik::light(blik::sky()));
+ *     blik::image image = solution.image(camera);
+ *
+ * The names and units are those of blik.h, which says what every member means. Objects move and do not copy; a scene
+ * must outlive its couplings, a coupling its solutions. Const objects may be used by any number of threads at once.
+ * With BLIK_NO_STD, too, objects own their memory: by new.
+ *
+ * SPDX-License-Identifier: MIT OR Apache-2.0
+ */
+
+#ifndef BLIK_HPP
+#define BLIK_HPP
+
+#include <blik.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace blik {
+
+/* A refused call: the words for the status, and what blik_error tells besides. */
+class error : public std::runtime_error {
+public:
+    explicit error(const blik_error &info) : std::runtime_error(message(info)), info_(info) {}
+    const blik_error &info() const noexcept { return info_; }
+    int32_t status() const noexcept { return info_.status; }
+
+private:
+    static std::string message(const blik_error &info) {
+        std::string text = std::string("blik: ") + blik_status_text(info.status);
+        const std::string field = blik_field_text(info.field);
+        if (!field.empty()) {
+            text += " (" + field + ", band " + std::to_string(info.band) + ", value " + std::to_string(info.value) + ")";
+        }
+        text += ", index " + std::to_string(info.index);
+        if (info.needed != 0) {
+            text += ", needed " + std::to_string(info.needed) + ", given " + std::to_string(info.given);
+        }
+        return text;
+    }
+    blik_error info_;
+};
+
+/* Throws unless a call that was given `info` returned BLIK_OK. */
+inline void check(int32_t status, const blik_error &info) {
+    if (status != BLIK_OK) {
+        throw error(info);
+    }
+}
+
+/* A contiguous array of somebody else: any container with data() and size(), or a pointer with a length. */
+template <typename T>
+class view {
+public:
+    constexpr view() noexcept = default;
+    constexpr view(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
+    template <std::size_t N>
+    constexpr view(T (&array)[N]) noexcept : data_(array), size_(N) {}
+    template <typename C, typename = std::enable_if_t<
+                              std::is_convertible_v<decltype(std::declval<C &>().data()), T *> &&
+                              !std::is_same_v<std::decay_t<C>, view>>>
+    constexpr view(C &container) noexcept : data_(container.data()), size_(container.size()) {}
+    constexpr T *data() const noexcept { return data_; }
+    constexpr std::size_t size() const noexcept { return size_; }
+    constexpr bool empty() const noexcept { return size_ == 0; }
+    constexpr T *begin() const noexcept { return data_; }
+    constexpr T *end() const noexcept { return data_ + size_; }
+    constexpr T &operator[](std::size_t index) const noexcept { return data_[index]; }
+
+private:
+    T *data_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+namespace detail {
+
+template <typename T>
+constexpr int32_t format() {
+    if constexpr (std::is_same_v<T, double>) {
+        return BLIK_F64;
+    } else if constexpr (std::is_same_v<T, float>) {
+        return BLIK_F32;
+    } else {
+        static_assert(std::is_integral_v<T> && (sizeof(T) == 1 || sizeof(T) == 2 || sizeof(T) == 4),
+                      "float, double or 8, 16, 32 bit integers");
+        return sizeof(T) == 1 ? BLIK_U8 : sizeof(T) == 2 ? BLIK_U16 : BLIK_U32;
+    }
+}
+
+template <typename T>
+struct numbers {
+    using type = T;
+};
+template <typename T, std::size_t N>
+struct numbers<std::array<T, N>> {
+    using type = T;
+};
+
+/* Entries of `width` numbers each, from a container of numbers or of std::array of them. */
+template <typename C>
+blik_array array(const C &container, std::size_t width) {
+    using entry = std::decay_t<decltype(*container.data())>;
+    using number = typename numbers<entry>::type;
+    const std::size_t count = container.size() * (sizeof(entry) / sizeof(number)) / width;
+    return blik_array{container.data(), count, width * sizeof(number), format<number>()};
+}
+
+inline void run_on_threads(void *, std::size_t count, blik_task task, void *context) {
+    std::vector<std::thread> threads;
+    threads.reserve(count);
+    try {
+        for (std::size_t i = 1; i < count; ++i) {
+            threads.emplace_back(task, context, i);
+        }
+    } catch (...) {
+        // no more threads: the first one takes all work that is left
+    }
+    task(context, 0);
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+}
+
+/* Frees a handle and, without the standard library, the memory in which it stands. */
+template <typename H>
+class owner {
+public:
+    owner() = default;
+    owner(owner &&other) noexcept
+        : handle_(std::exchange(other.handle_, nullptr)), memory_(std::move(other.memory_)) {}
+    owner &operator=(owner &&other) noexcept {
+        owner(std::move(other)).swap(*this);
+        return *this;
+    }
+    ~owner() { destroy(handle_); }
+    void swap(owner &other) noexcept {
+        std::swap(handle_, other.handle_);
+        memory_.swap(other.memory_);
+    }
+    const H *get() const noexcept { return handle_; }
+
+    H *handle_ = nullptr;
+    std::unique_ptr<unsigned char[]> memory_;
+
+private:
+    static void destroy(blik_scene *handle) noexcept { blik_scene_destroy(handle); }
+    static void destroy(blik_coupling *handle) noexcept { blik_coupling_destroy(handle); }
+    static void destroy(blik_solution *handle) noexcept { blik_solution_destroy(handle); }
+};
+
+#ifndef BLIK_STD
+/* Memory of the size that `size` tells, handed to `init`, and more as long as that asks for more. */
+template <typename H, typename Size, typename Init>
+owner<H> in_memory(Size size, Init init) {
+    blik_error info{};
+    std::size_t bytes = 0;
+    check(size(&info, &bytes), info);
+    for (;;) {
+        owner<H> made;
+        const H *handle = nullptr;
+        made.memory_.reset(new unsigned char[bytes]);
+        const int32_t status = init(made.memory_.get(), bytes, &info, &handle);
+        if (status == BLIK_ERROR_BUFFER_TOO_SMALL && info.needed > bytes) {
+            bytes = info.needed;
+            continue;
+        }
+        check(status, info);
+        made.handle_ = const_cast<H *>(handle);
+        return made;
+    }
+}
+#endif
+
+} // namespace detail
+
+/* How long stages run: on the calling thread. */
+inline blik_run alone() {
+    blik_run run;
+    blik_run_init(&run);
+    return run;
+}
+
+/* How long stages run: on `count` threads, 0 for as many as there are processors. */
+inline blik_run threads(unsigned count = 0) {
+    blik_run run = alone();
+    const unsigned all = count != 0 ? count : std::thread::hardware_concurrency();
+    run.lanes = all == 0 ? 1 : all > 256 ? 256 : all;
+    run.parallel = detail::run_on_threads;
+    return run;
+}
+
+/* blik_settings with its defaults. */
+inline blik_settings settings(double tolerance = 2e-3) {
+    blik_settings value;
+    blik_settings_init(&value);
+    value.tolerance = tolerance;
+    return value;
+}
+
+/* blik_sky with its defaults: radiance 1 in all bands. */
+inline blik_sky sky(int32_t model = BLIK_SKY_UNIFORM) {
+    blik_sky value;
+    blik_sky_init(&value);
+    value.model = model;
+    return value;
+}
+
+/* blik_sun with its defaults: irradiance pi in all bands. */
+inline blik_sun sun(const std::array<double, 3> &direction) {
+    blik_sun value;
+    blik_sun_init(&value);
+    for (std::size_t k = 0; k < 3; ++k) {
+        value.direction[k] = direction[k];
+    }
+    return value;
+}
+
+/* A sky, a sun or both; copied, but for the arrays that they point to. */
+class light {
+public:
+    explicit light(const blik_sky &sky) : sky_(sky), has_sky_(true) {}
+    explicit light(const blik_sun &sun) : sun_(sun), has_sun_(true) {}
+    light(const blik_sky &sky, const blik_sun &sun) : sky_(sky), sun_(sun), has_sky_(true), has_sun_(true) {}
+    /* One value per band, to which tolerance and errors are related. */
+    light &reference_radiance(std::vector<double> values) {
+        reference_ = std::move(values);
+        return *this;
+    }
+    blik_light get() const noexcept {
+        blik_light value;
+        blik_light_init(&value);
+        value.sky = has_sky_ ? &sky_ : nullptr;
+        value.sun = has_sun_ ? &sun_ : nullptr;
+        value.reference_radiance = reference_.empty() ? nullptr : reference_.data();
+        return value;
+    }
+
+private:
+    blik_sky sky_{};
+    blik_sun sun_{};
+    bool has_sky_ = false;
+    bool has_sun_ = false;
+    std::vector<double> reference_;
+};
+
+/* An orthographic camera; height in the mesh's unit. */
+inline blik_camera orthographic(const std::array<double, 3> &eye, const std::array<double, 3> &target, double height,
+                                std::size_t columns, std::size_t rows) {
+    blik_camera camera;
+    blik_camera_init(&camera);
+    for (std::size_t k = 0; k < 3; ++k) {
+        camera.eye[k] = eye[k];
+        camera.target[k] = target[k];
+    }
+    camera.height = height;
+    camera.columns = columns;
+    camera.rows = rows;
+    return camera;
+}
+
+/* A perspective camera; vertical field of view in degrees. */
+inline blik_camera perspective(const std::array<double, 3> &eye, const std::array<double, 3> &target, double fov_deg,
+                               std::size_t columns, std::size_t rows) {
+    blik_camera camera = orthographic(eye, target, 0.0, columns, rows);
+    camera.projection = BLIK_PERSPECTIVE;
+    camera.fov_deg = fov_deg;
+    return camera;
+}
+
+/* A mesh over arrays of the caller, which are read where a scene is made of it, and materials of its own. */
+class mesh {
+public:
+    /* 3 numbers a vertex, 3 indices a facet: containers of numbers or of std::array of 3. */
+    template <typename V, typename F>
+    mesh(const V &vertices, const F &facets, std::size_t bands = 1) {
+        blik_mesh_init(&mesh_);
+        mesh_.vertices = detail::array(vertices, 3);
+        mesh_.facets = detail::array(facets, 3);
+        mesh_.bands = bands;
+    }
+    /* Any layout. */
+    explicit mesh(const blik_mesh &arrays) : mesh_(arrays) {}
+
+    /* Adds a material; empty: zeros. Its index is its place. */
+    mesh &material(std::vector<double> diffuse, std::vector<double> specular = {}, std::vector<double> emission = {},
+                   double gloss_axis_ratio = 0.0, uint32_t gloss_rays = 0) {
+        for (const std::vector<double> *values : {&diffuse, &specular, &emission}) {
+            if (!values->empty() && values->size() != mesh_.bands) {
+                throw std::invalid_argument("blik: a material needs one value per band");
+            }
+        }
+        materials_.push_back({std::move(diffuse), std::move(specular), std::move(emission), gloss_axis_ratio, gloss_rays});
+        return *this;
+    }
+    /* One material index a facet. */
+    template <typename M>
+    mesh &facet_materials(const M &indices) {
+        mesh_.facet_materials = detail::array(indices, 1);
+        return *this;
+    }
+    /* 3 numbers a normal, one normal a vertex: mirror directions follow them. */
+    template <typename N>
+    mesh &normals(const N &normals) {
+        mesh_.normals = detail::array(normals, 3);
+        return *this;
+    }
+    mesh &two_sided(bool both = true) {
+        mesh_.two_sided = both ? 1 : 0;
+        return *this;
+    }
+
+    /* Calls `with` with the struct of the C interface. */
+    template <typename W>
+    auto with(W with) const {
+        std::vector<blik_material> materials;
+        const auto values = [](const std::vector<double> &v) { return v.empty() ? nullptr : v.data(); };
+        for (const owned &m : materials_) {
+            materials.push_back({values(m.diffuse), values(m.specular), values(m.emission), m.gloss_axis_ratio, m.gloss_rays});
+        }
+        blik_mesh all = mesh_;
+        if (!materials.empty()) {
+            all.materials = materials.data();
+            all.material_count = materials.size();
+        }
+        return with(all);
+    }
+
+private:
+    struct owned {
+        std::vector<double> diffuse, specular, emission;
+        double gloss_axis_ratio;
+        uint32_t gloss_rays;
+    };
+    blik_mesh mesh_;
+    std::vector<owned> materials_;
+};
+
+/* A checked mesh, ready for rays. */
+class scene {
+public:
+    explicit scene(const mesh &mesh) {
+        mesh.with([&](const blik_mesh &arrays) {
+#ifdef BLIK_STD
+            blik_error info{};
+            check(blik_scene_create(&arrays, &info, &owner_.handle_), info);
+#else
+            owner_ = detail::in_memory<blik_scene>(
+                [&](blik_error *e, std::size_t *bytes) { return blik_scene_size(&arrays, e, bytes); },
+                [&](void *memory, std::size_t bytes, blik_error *e, const blik_scene **out) {
+                    return blik_scene_init(&arrays, memory, bytes, e, out);
+                });
+#endif
+        });
+    }
+    const blik_scene *get() const noexcept { return owner_.get(); }
+    blik_scene_info info() const {
+        blik_error info{};
+        blik_scene_info value{};
+        check(blik_scene_get_info(get(), &info, &value), info);
+        return value;
+    }
+    /* The first facet that each ray meets. */
+    void closest_hits(view<const blik_ray> rays, view<blik_hit> hits, const blik_run &run = alone()) const {
+        if (rays.size() != hits.size()) {
+            throw std::invalid_argument("blik: one hit per ray");
+        }
+        blik_error info{};
+        check(blik_closest_hits(get(), rays.data(), rays.size(), &run, &info, hits.data()), info);
+    }
+
+private:
+    detail::owner<blik_scene> owner_;
+};
+
+/* Extended form factors of a scene, which must outlive it. */
+class coupling {
+public:
+    explicit coupling(const scene &scene, const blik_settings &settings = blik::settings(),
+                      const blik_run &run = alone()) {
+#ifdef BLIK_STD
+        blik_error info{};
+        check(blik_coupling_create(scene.get(), &settings, &run, &info, &owner_.handle_), info);
+#else
+        owner_ = detail::in_memory<blik_coupling>(
+            [&](blik_error *e, std::size_t *bytes) { return blik_coupling_size(scene.get(), &settings, e, bytes); },
+            [&](void *memory, std::size_t bytes, blik_error *e, const blik_coupling **out) {
+                return blik_coupling_init(scene.get(), &settings, &run, memory, bytes, e, out);
+            });
+#endif
+        bands_ = scene.info().bands;
+    }
+    const blik_coupling *get() const noexcept { return owner_.get(); }
+    std::size_t bands() const noexcept { return bands_; }
+    blik_coupling_info info() const {
+        blik_error info{};
+        blik_coupling_info value{};
+        check(blik_coupling_get_info(get(), &info, &value), info);
+        return value;
+    }
+
+private:
+    detail::owner<blik_coupling> owner_;
+    std::size_t bands_ = 0;
+};
+
+/* Radiance by row (0 at the top), column and band. */
+struct image {
+    std::size_t columns = 0, rows = 0, bands = 0;
+    std::vector<float> pixels;
+    blik_tally tally{};
+
+    float at(std::size_t row, std::size_t column, std::size_t band = 0) const {
+        return pixels.at((row * columns + column) * bands + band);
+    }
+};
+
+/* A scene under one light, solved; its coupling must outlive it. */
+class solution {
+public:
+    solution(const coupling &coupling, const light &light, const blik_run &run = alone()) : bands_(coupling.bands()) {
+        const blik_light value = light.get();
+#ifdef BLIK_STD
+        blik_error info{};
+        check(blik_solution_create(coupling.get(), &value, &run, &info, &owner_.handle_), info);
+#else
+        owner_ = detail::in_memory<blik_solution>(
+            [&](blik_error *e, std::size_t *bytes) { return blik_solution_size(coupling.get(), &value, e, bytes); },
+            [&](void *memory, std::size_t bytes, blik_error *e, const blik_solution **out) {
+                return blik_solution_init(coupling.get(), &value, &run, memory, bytes, e, out);
+            });
+#endif
+    }
+    const blik_solution *get() const noexcept { return owner_.get(); }
+    std::size_t bands() const noexcept { return bands_; }
+
+    /* The whole image. */
+    blik::image image(const blik_camera &camera, const blik_run &run = alone()) const {
+        blik::image out{camera.columns, camera.rows, bands_, {}, {}};
+        out.pixels.resize(camera.columns * camera.rows * bands_);
+        blik_error info{};
+        std::size_t bytes = 0;
+        check(blik_image_scratch_size(get(), &camera, &run, &info, &bytes), info);
+        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
+        check(blik_image(get(), &camera, &run, scratch.get(), bytes, &info, out.pixels.data(), out.pixels.size(),
+                         nullptr, &out.tally),
+              info);
+        return out;
+    }
+    /* Rows first .. first + rows of it, for schedulers and processes of the caller. */
+    blik::image image_rows(const blik_camera &camera, std::size_t first, std::size_t rows) const {
+        blik::image out{camera.columns, rows, bands_, {}, {}};
+        out.pixels.resize(camera.columns * rows * bands_);
+        blik_error info{};
+        std::size_t bytes = 0;
+        check(blik_image_scratch_size(get(), &camera, nullptr, &info, &bytes), info);
+        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
+        check(blik_image_rows(get(), &camera, first, rows, scratch.get(), bytes, &info, out.pixels.data(),
+                              out.pixels.size(), nullptr, &out.tally),
+              info);
+        return out;
+    }
+    /* How good an image is; `tally` of all its rows. */
+    blik_report report(const blik_tally &tally) const {
+        blik_error info{};
+        blik_report value{};
+        check(blik_get_report(get(), &tally, &info, &value), info);
+        return value;
+    }
+    /* One entry per direction and band; three numbers a direction, toward the object. */
+    std::vector<blik_signature> signatures(view<const std::array<double, 3>> directions,
+                                           const blik_run &run = alone(), std::size_t cells = 0) const {
+        std::vector<blik_signature> out(directions.size() * bands_);
+        blik_error info{};
+        const double *first = directions.empty() ? nullptr : directions.data()->data();
+        check(blik_signatures(get(), first, directions.size(), cells, &run, &info, out.data()), info);
+        return out;
+    }
+
+private:
+    detail::owner<blik_solution> owner_;
+    std::size_t bands_ = 0;
+};
+
+} // namespace blik
+
+#endif /* BLIK_HPP */

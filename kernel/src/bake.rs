@@ -1,0 +1,409 @@
+//! A scene with its tree, its elements, its coupling and, if wanted, its solution as one block of bytes that can be
+//! kept, sent and put into read-only memory: relocatable, read without a copy.
+//!
+//! A block starts on a boundary of [`ALIGNMENT`]. Its head tells version, byte order, size and checksum; arrays follow
+//! in fixed order, each on a boundary. [`Baked::load`] checks everything on which the kernel relies: whatever the bytes
+//! are, what it lets through makes no call panic, run without end or give NaN. (A block that was forged with a right
+//! checksum may still show a wrong image.)
+//!
+//! The byte order and the layout of numbers are those of the machine that wrote it: little-endian machines of 32 and of
+//! 64 bits read each other's blocks.
+
+use crate::arena::{ALIGNMENT, Arena, View, plain_struct};
+use crate::bvh::Bvh;
+use crate::coupling::Block;
+use crate::element::Elements;
+use crate::error::Error;
+use crate::index::Index;
+use crate::light::{self, Shape};
+use crate::policy;
+use crate::scene::{MAX_BANDS, Scene};
+use crate::simd::Isa;
+use crate::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use crate::sun::{Sun, SunInput};
+
+/// Version of the layout; another one is refused.
+pub const VERSION: u64 = 1;
+
+/// "BLIKBAKE"; its bytes tell the byte order.
+const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");
+
+/// Place of the checksum among the 64-bit words.
+const CHECKSUM: usize = 3;
+
+plain_struct! {
+    /// What stands first.
+    pub struct Head {
+        /// "BLIKBAKE" in the machine's byte order.
+        pub magic: u64,
+        /// [`VERSION`].
+        pub version: u64,
+        /// Bytes of the whole block.
+        pub bytes: u64,
+        /// Of all 64-bit words, this one taken as 0.
+        pub checksum: u64,
+        /// The wanted error.
+        pub tolerance: f64,
+        /// Largest number of reflections; `u64::MAX`: by tolerance.
+        pub max_bounces: u64,
+        /// Bit 0: irradiance of all facets is wanted; bit 1: directions are kept.
+        pub flags: u64,
+        /// Blocks of the coupling.
+        pub blocks: u64,
+        /// 1 where a solution follows.
+        pub solved: u64,
+    }
+}
+
+/// What decided the coupling besides the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The wanted error.
+    pub tolerance: f64,
+    /// Light reflected more often does not count; `None`: by tolerance.
+    pub max_bounces: Option<u32>,
+    /// Irradiance of all facets is wanted.
+    pub all: bool,
+    /// Directions of blocked and mirrored light are kept.
+    pub directional: bool,
+}
+
+/// Light and what it gave.
+#[derive(Clone, Copy, Debug)]
+pub struct Solution<'m> {
+    /// The sky.
+    pub sky: Option<SkyInput<'m>>,
+    /// The sun.
+    pub sun: Option<SunInput<'m>>,
+    /// Reference radiance of each band.
+    pub reference: &'m [f64],
+    /// Mean and gradients of each unknown's irradiance without the sun's direct part.
+    pub irradiance: &'m [f64],
+    /// Mean of cos V of the sun of each unknown.
+    pub lit: &'m [f64],
+    /// Expected error of each unknown.
+    pub noise: &'m [f32],
+    /// Numbers.
+    pub numbers: Numbers,
+}
+
+plain_struct! {
+    /// Numbers of a solution.
+    pub struct Numbers {
+        /// Largest radiance that any ray can see, relative to the reference.
+        pub brightest: f64,
+        /// Bound on the radiances' error.
+        pub solver: f64,
+        /// Sweeps done.
+        pub sweeps: u64,
+        /// Rays toward the sun.
+        pub sun_rays: u64,
+    }
+}
+
+plain_struct! {
+    /// The light without its arrays.
+    pub struct LightHead {
+        /// 0: none; else the sky's model, 1 + its place in [`SkyModel`].
+        pub model: u64,
+        /// Type of a CIE sky.
+        pub cie_type: u64,
+        /// Toward the zenith.
+        pub up: [f64; 3],
+        /// Sun of a CIE sky, or azimuth 0 of a table.
+        pub direction: [f64; 3],
+        /// Rows, columns and bands of a table.
+        pub table: [u64; 3],
+        /// 1 where there is a sun.
+        pub sun: u64,
+        /// Toward the sun.
+        pub sun_direction: [f64; 3],
+        /// Half angle of the sun.
+        pub half_angle_deg: f64,
+    }
+}
+
+/// Everything that is baked.
+#[derive(Clone, Copy, Debug)]
+pub struct Baked<'m> {
+    /// The scene.
+    pub scene: Scene<'m>,
+    /// Its tree.
+    pub bvh: Bvh<'m>,
+    /// Its elements.
+    pub elements: Elements<'m>,
+    /// Blocks of the coupling, packed ([`crate::coupling::pack`]).
+    pub blocks: &'m [Block<'m>],
+    /// What decided the coupling.
+    pub settings: Settings,
+    /// The solution, if any.
+    pub solution: Option<Solution<'m>>,
+}
+
+/// Writes arrays one after the other, or counts their bytes.
+pub(crate) struct Writer<'o> {
+    memory: Option<&'o mut [u8]>,
+    at: usize,
+}
+
+impl Writer<'_> {
+    pub fn put<T: crate::arena::Plain>(&mut self, values: &[T]) -> Result<(), Error> {
+        let start = self.at.next_multiple_of(ALIGNMENT);
+        self.at = start.checked_add(size_of_val(values)).ok_or(Error::Block)?;
+        let Some(memory) = &mut self.memory else { return Ok(()) };
+        let given = memory.len();
+        let part = memory.get_mut(start..).ok_or(Error::BufferTooSmall { needed: self.at, given })?;
+        let to = Arena::new(part, 0)?.take::<T>(values.len())?;
+        crate::index::copy(to, values);
+        Ok(())
+    }
+}
+
+/// The words of a block mixed to one number; its own place counts as 0.
+fn checksum(bytes: &[u8]) -> u64 {
+    let mut sum = 0x9e37_79b9_7f4a_7c15_u64;
+    for (at, word) in bytes.as_chunks::<8>().0.iter().enumerate() {
+        let word = if at == CHECKSUM { 0 } else { u64::from_ne_bytes(*word) };
+        sum = (sum ^ word).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        sum ^= sum >> 32;
+    }
+    sum
+}
+
+/// One value for each of `bands` bands; zeros beyond what there is.
+fn put_bands(writer: &mut Writer<'_>, values: &[f64], bands: usize) -> Result<(), Error> {
+    let mut all = [0.0; MAX_BANDS];
+    crate::index::copy(&mut all, values);
+    writer.put(all.head(bands))
+}
+
+impl<'m> Baked<'m> {
+    /// Bytes that [`Baked::write`] needs.
+    pub fn bytes(&self) -> Result<usize, Error> {
+        let mut writer = Writer { memory: None, at: 0 };
+        self.put(&mut writer, Head::default())?;
+        Ok(writer.at.next_multiple_of(ALIGNMENT))
+    }
+
+    /// Writes the block to `memory`, which starts on a boundary of [`ALIGNMENT`], and returns its size.
+    pub fn write(&self, memory: &mut [u8]) -> Result<usize, Error> {
+        let (bytes, given) = (self.bytes()?, memory.len());
+        let memory = memory.get_mut(..bytes).ok_or(Error::BufferTooSmall { needed: bytes, given })?;
+        memory.fill(0);
+        let mut head = Head {
+            magic: MAGIC,
+            version: VERSION,
+            bytes: bytes as u64,
+            checksum: 0,
+            tolerance: self.settings.tolerance,
+            max_bounces: self.settings.max_bounces.map_or(u64::MAX, u64::from),
+            flags: u64::from(self.settings.all) | u64::from(self.settings.directional) << 1,
+            blocks: self.blocks.len() as u64,
+            solved: u64::from(self.solution.is_some()),
+        };
+        self.put(&mut Writer { memory: Some(&mut *memory), at: 0 }, head)?;
+        head.checksum = checksum(memory);
+        let mut writer = Writer { memory: Some(memory), at: 0 };
+        writer.put(&[head])?;
+        Ok(bytes)
+    }
+
+    fn put(&self, writer: &mut Writer<'_>, head: Head) -> Result<(), Error> {
+        writer.put(&[head])?;
+        self.scene.put(writer)?;
+        self.bvh.put(writer)?;
+        self.elements.put(writer)?;
+        for block in self.blocks {
+            block.put(writer)?;
+        }
+        match &self.solution {
+            Some(solution) => solution.put(writer, self.scene.bands()),
+            None => Ok(()),
+        }
+    }
+
+    /// How many blocks of coupling the block in `memory` holds: room that [`Baked::load`] needs. The head alone is
+    /// checked.
+    pub fn count(memory: &[u8]) -> Result<usize, Error> {
+        let head = head(memory)?;
+        // every block has a head of its own
+        if head.blocks > head.bytes / ALIGNMENT as u64 {
+            return Err(Error::Block);
+        }
+        Ok(head.blocks as usize)
+    }
+
+    /// Checks the block in `memory`, which starts on a boundary of [`ALIGNMENT`], and reads it; `blocks` has as many
+    /// places as [`Baked::count`] says, of any content.
+    ///
+    /// # Errors
+    /// [`Error::Block`] for anything that is not as it should be.
+    pub fn load(memory: &'m [u8], isa: Isa, blocks: &'m mut [Block<'m>]) -> Result<Baked<'m>, Error> {
+        let head = head(memory)?;
+        let memory = memory.get(..head.bytes as usize).ok_or(Error::Block)?;
+        let wanted = Baked::count(memory)?;
+        if blocks.len() != wanted || checksum(memory) != head.checksum {
+            return Err(Error::Block);
+        }
+        Baked::read(&head, memory, isa, blocks).map_err(|_| Error::Block)
+    }
+
+    fn read(
+        head: &Head,
+        memory: &'m [u8],
+        isa: Isa,
+        blocks: &'m mut [Block<'m>],
+    ) -> Result<Baked<'m>, Error> {
+        policy::check_tolerance(head.tolerance)?;
+        let max_bounces = match head.max_bounces {
+            u64::MAX => None,
+            most => Some(u32::try_from(most).map_err(|_| Error::Block)?),
+        };
+        let settings = Settings {
+            tolerance: head.tolerance,
+            max_bounces,
+            all: head.flags & 1 != 0,
+            directional: head.flags & 2 != 0,
+        };
+        let mut view = View::new(memory);
+        view.take::<Head>(1)?;
+        let scene = Scene::get(&mut view)?;
+        let bvh = Bvh::get(&mut view, &scene, isa)?;
+        let elements = Elements::get(&mut view, &scene)?;
+        let mut next = 0;
+        for place in blocks.iter_mut() {
+            *place = Block::get(&mut view, &scene, &elements, settings.directional)?;
+            if place.range().start != next || place.range().is_empty() {
+                return Err(Error::Block);
+            }
+            next = place.range().end;
+        }
+        if next != elements.unknowns() || head.flags > 3 || head.solved > 1 {
+            return Err(Error::Block);
+        }
+        let shape = policy::shape(max_bounces, scene.bands());
+        let solved = head.solved == 1;
+        let solution = solved.then(|| Solution::get(&mut view, &elements, shape)).transpose()?;
+        Ok(Baked { scene, bvh, elements, blocks, settings, solution })
+    }
+}
+
+/// The head, of this version and byte order, its size within the memory.
+fn head(memory: &[u8]) -> Result<Head, Error> {
+    if memory.as_ptr().align_offset(ALIGNMENT) != 0 {
+        return Err(Error::Block);
+    }
+    let head = View::new(memory).take::<Head>(1).map_err(|_| Error::Block)?.first().copied();
+    let head = head.ok_or(Error::Block)?;
+    let right = head.magic == MAGIC && head.version == VERSION;
+    if !right || head.bytes > memory.len() as u64 || head.bytes % ALIGNMENT as u64 != 0 {
+        return Err(Error::Block);
+    }
+    Ok(head)
+}
+
+impl<'m> Solution<'m> {
+    fn put(&self, writer: &mut Writer<'_>, bands: usize) -> Result<(), Error> {
+        let mut head = LightHead::default();
+        let (mut radiance, mut ground, mut samples): (&[f64], &[f64], &[f32]) = (&[], &[], &[]);
+        if let Some(sky) = &self.sky {
+            (radiance, ground, head.up) = (sky.radiance, sky.ground, sky.up);
+            head.model = match sky.model {
+                SkyModel::Uniform => 1,
+                SkyModel::Hemisphere => 2,
+                SkyModel::Overcast => 3,
+                SkyModel::Cie { kind, sun_direction } => {
+                    (head.cie_type, head.direction) = (u64::from(kind), sun_direction);
+                    4
+                }
+                SkyModel::Gradient => 5,
+                SkyModel::Table(table) => {
+                    head.table = [table.rows as u64, table.columns as u64, table.bands as u64];
+                    head.direction = table.azimuth_zero.unwrap_or_default();
+                    samples = table.radiance;
+                    6
+                }
+            };
+        }
+        if let Some(sun) = &self.sun {
+            (head.sun, head.sun_direction, head.half_angle_deg) = (1, sun.direction, sun.half_angle_deg);
+        }
+        writer.put(&[head])?;
+        put_bands(writer, radiance, bands)?;
+        put_bands(writer, ground, bands)?;
+        put_bands(writer, self.sun.map_or(&[], |s| s.irradiance), bands)?;
+        writer.put(samples)?;
+        writer.put(&[self.numbers])?;
+        writer.put(self.reference)?;
+        writer.put(self.irradiance)?;
+        writer.put(self.lit)?;
+        writer.put(self.noise)
+    }
+
+    fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: Shape) -> Result<Solution<'m>, Error> {
+        let (bands, unknowns) = (shape.bands, elements.unknowns());
+        let head = view.take::<LightHead>(1)?.first().copied().ok_or(Error::Block)?;
+        let (radiance, ground) = (view.take::<f64>(bands)?, view.take::<f64>(bands)?);
+        let irradiance = view.take::<f64>(bands)?;
+        let [rows, columns, depth] = head.table.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+        let count = rows.checked_mul(columns).and_then(|n| n.checked_mul(depth)).ok_or(Error::Block)?;
+        let samples = view.take::<f32>(count)?;
+        let azimuth_zero = (head.direction != [0.0; 3]).then_some(head.direction);
+        let model = match head.model {
+            0 => None,
+            1 => Some(SkyModel::Uniform),
+            2 => Some(SkyModel::Hemisphere),
+            3 => Some(SkyModel::Overcast),
+            4 => {
+                let kind = u32::try_from(head.cie_type).map_err(|_| Error::Block)?;
+                Some(SkyModel::Cie { kind, sun_direction: head.direction })
+            }
+            5 => Some(SkyModel::Gradient),
+            6 => Some(SkyModel::Table(SkyTable {
+                rows,
+                columns,
+                bands: depth,
+                radiance: samples,
+                azimuth_zero,
+            })),
+            _ => return Err(Error::Block),
+        };
+        let sky = model.map(|model| SkyInput { model, radiance, ground, up: head.up });
+        let (direction, half_angle_deg) = (head.sun_direction, head.half_angle_deg);
+        let sun = (head.sun == 1).then_some(SunInput { direction, irradiance, half_angle_deg });
+        if let Some(sky) = &sky {
+            Sky::new(sky, bands)?;
+        }
+        if let Some(sun) = &sun {
+            Sun::new(sun, bands)?;
+        }
+        let numbers = view.take::<Numbers>(1)?.first().copied().ok_or(Error::Block)?;
+        let reference = view.take::<f64>(bands)?;
+        let irradiance = view.take::<f64>(unknowns.checked_mul(shape.stride()).ok_or(Error::Block)?)?;
+        let (lit, noise) = (view.take::<f64>(unknowns)?, view.take::<f32>(unknowns)?);
+        let solution = Solution { sky, sun, reference, irradiance, lit, noise, numbers };
+        solution.check()?;
+        Ok(solution)
+    }
+
+    /// Values within what the kernel makes.
+    fn check(&self) -> Result<(), Error> {
+        let positive = |x: &f64| (0.0..=1e300).contains(x);
+        // irradiance: pi times the largest radiance, gradients some times that
+        let right = self.irradiance.iter().all(|x| x.abs() <= 1e40)
+            && self.lit.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
+            && self.noise.iter().all(|x| (0.0..=f32::MAX).contains(x))
+            && self.reference.iter().all(|x| (0.0..=1e38).contains(x))
+            && positive(&self.numbers.brightest)
+            && self.numbers.solver >= 0.0;
+        if right { Ok(()) } else { Err(Error::Block) }
+    }
+
+    /// The kernel's light.
+    pub fn light(&self, bands: usize) -> Result<light::Light<'m>, Error> {
+        Ok(light::Light {
+            sky: self.sky.as_ref().map(|s| Sky::new(s, bands)).transpose()?,
+            sun: self.sun.as_ref().map(|s| Sun::new(s, bands)).transpose()?,
+        })
+    }
+}

@@ -1,0 +1,81 @@
+// The C++ header: moves, exceptions, threads, containers. Exit 0 when all is as stated; compiled as C++17 to C++23.
+#include <blik.hpp>
+
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#define REQUIRE(condition)                                                        \
+    do {                                                                          \
+        if (!(condition)) {                                                       \
+            std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);  \
+            return 1;                                                             \
+        }                                                                         \
+    } while (false)
+
+static_assert(!std::is_copy_constructible_v<blik::scene> && std::is_nothrow_move_constructible_v<blik::scene>);
+static_assert(!std::is_copy_assignable_v<blik::solution> && std::is_nothrow_move_assignable_v<blik::solution>);
+
+int main() {
+    const std::vector<std::array<double, 3>> vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {0, 1, 1}};
+    const std::array<std::array<uint32_t, 3>, 4> facets = {{{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}}};
+    const std::vector<uint16_t> materials = {0, 0, 1, 1};
+    blik::mesh mesh(vertices, facets, 2);
+    mesh.facet_materials(materials).material({0.5, 0.4}).material({0.1, 0.2}, {0.5, 0.3}, {}, 20.0, 4);
+
+    blik::scene first(mesh);
+    blik::scene scene(std::move(first));
+    REQUIRE(first.get() == nullptr && scene.get() != nullptr);
+    first = std::move(scene);
+    scene = std::move(first);
+    REQUIRE(scene.info().facets == 4 && scene.info().bands == 2);
+
+    const blik::coupling coupling(scene, blik::settings(2e-2), blik::threads(3));
+    const std::array<double, 2> radiance = {1.0, 0.5};
+    blik_sky sky = blik::sky(BLIK_SKY_HEMISPHERE);
+    sky.radiance = radiance.data();
+    const blik_camera camera = blik::orthographic({3, 0.5, 2}, {0.5, 0.5, 0.3}, 2.0, 9, 7);
+    blik::solution solution(coupling, blik::light(sky, blik::sun({1, 0, 1})), blik::threads(2));
+    const blik::image alone = solution.image(camera), threaded = solution.image(camera, blik::threads(4));
+    REQUIRE(alone.pixels == threaded.pixels && alone.pixels.size() == 9 * 7 * 2);
+
+    // rows by rows, and relit: the same coupling, other light
+    blik_tally sum{};
+    std::vector<float> pixels;
+    for (std::size_t row = 0; row < 7; ++row) {
+        const blik::image part = solution.image_rows(camera, row, 1);
+        pixels.insert(pixels.end(), part.pixels.begin(), part.pixels.end());
+        blik_tally_add(&sum, &part.tally);
+    }
+    REQUIRE(pixels == alone.pixels && sum.object_pixels == alone.tally.object_pixels);
+    REQUIRE(solution.report(alone.tally).tolerance == 2e-2);
+    solution = blik::solution(coupling, blik::light(blik::sky()));
+    REQUIRE(solution.image(camera).pixels != alone.pixels);
+    const std::vector<std::array<double, 3>> directions = {{-1, 0, -1}, {0, 0, -1}};
+    const std::vector<blik_signature> signatures = solution.signatures(directions, blik::threads(2));
+    REQUIRE(signatures.size() == 4 && signatures[2].projected_area > 0.99 && signatures[2].projected_area < 1.01);
+
+    std::vector<blik_ray> rays(1);
+    rays[0] = {{0.5, 0.5, 2}, {0, 0, -1}, 1e9, BLIK_NO_FACET};
+    std::vector<blik_hit> hits(1);
+    scene.closest_hits(rays, hits);
+    REQUIRE(hits[0].t == 2.0 && hits[0].facet < 2 && hits[0].front == 1);
+
+    int caught = 0;
+    try {
+        blik::coupling(scene, blik::settings(0.5));
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_RANGE && error.info().field == BLIK_FIELD_TOLERANCE;
+    }
+    try {
+        const std::array<std::array<uint32_t, 3>, 1> wrong = {{{0, 1, 6}}};
+        blik::mesh bad(vertices, wrong);
+        bad.material({0.5});
+        const blik::scene none(bad);
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_VERTEX_INDEX && error.info().value == 6.0;
+    }
+    REQUIRE(caught == 2);
+    std::puts("ok");
+    return 0;
+}

@@ -1,0 +1,220 @@
+//! The library from C and C++: programs compile as every standard without a warning, link at the first try, and run;
+//! its symbols are what the header declares; its layouts are those of the stored baseline.
+//!
+//! After a change of the interface that is meant: `UPDATE_ABI=1 cargo test --test c_library` writes the baseline anew.
+
+use std::collections::BTreeSet;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The folder of `libblik.a` and `libblik.so`, built once.
+fn library() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        let output = Command::new(env!("CARGO"))
+            .current_dir(root())
+            .args(["rustc", "-p", "blik-ffi", "--lib", "--crate-type", "staticlib,cdylib"])
+            .args(["--features", "std"])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        // this test's program is target/PROFILE/deps/NAME
+        let target = std::env::current_exe().unwrap().ancestors().nth(3).unwrap().to_path_buf();
+        target.join("debug")
+    })
+}
+
+/// True where the compiler is there and knows the standard.
+fn knows(compiler: &str, standard: &str) -> bool {
+    let language = if standard.contains("++") { "c++" } else { "c" };
+    let output = Command::new(compiler)
+        .args([&format!("-std={standard}"), "-x", language, "-E", "/dev/null"])
+        .output();
+    match output {
+        Err(error) if error.kind() == ErrorKind::NotFound => false,
+        output => output.unwrap().status.success(),
+    }
+}
+
+/// How a program is linked.
+#[derive(Clone, Copy, PartialEq)]
+enum Link {
+    Static,
+    Shared,
+}
+
+fn text(output: &Output) -> String {
+    format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+}
+
+/// Compiles, links and runs a program; what it printed.
+fn run(compiler: &str, standard: &str, source: &Path, link: Link) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("program");
+    let mut command = Command::new(compiler);
+    command.arg(format!("-std={standard}")).args(["-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]);
+    command.args(["-Wconversion", "-Wshadow", "-Wundef", "-Wcast-align"]);
+    command.arg("-I").arg(root().join("include")).arg(source).arg("-o").arg(&program);
+    match link {
+        Link::Static => command.arg(library().join("libblik.a")).args(["-lpthread", "-ldl", "-lm"]),
+        Link::Shared => command.arg("-L").arg(library()).args(["-lblik", "-lpthread", "-lm"]),
+    };
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{compiler} -std={standard}:\n{}", text(&output));
+    let output = Command::new(&program).env("LD_LIBRARY_PATH", library()).output().unwrap();
+    assert!(output.status.success(), "{compiler} -std={standard}: {}", text(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn c_programs_run_as_every_standard() {
+    let source = root().join("tests/c/interface.c");
+    for compiler in ["cc", "clang"] {
+        for standard in ["c99", "c11", "c17", "c2x"].iter().filter(|s| knows(compiler, s)) {
+            let link = if *standard == "c11" { Link::Shared } else { Link::Static };
+            assert_eq!(run(compiler, standard, &source, link), "ok\n");
+        }
+    }
+}
+
+#[test]
+fn cpp_programs_run_as_every_standard() {
+    let source = root().join("tests/c/interface.cpp");
+    for compiler in ["c++", "clang++"] {
+        for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
+            let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
+            assert_eq!(run(compiler, standard, &source, link), "ok\n");
+        }
+    }
+}
+
+#[test]
+fn the_readme_shows_a_program_of_at_most_forty_lines_that_runs() {
+    let source = root().join("ffi/examples/minimal.cpp");
+    let program = std::fs::read_to_string(&source).unwrap();
+    assert!(program.lines().count() <= 40);
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    assert!(readme.contains(&format!("```cpp\n{program}```")), "README.md shows another program");
+    if knows("c++", "c++17") {
+        let printed = run("c++", "c++17", &source, Link::Static);
+        assert!(printed.lines().count() == 25 && printed.contains("error estimate"), "{printed}");
+    }
+}
+
+fn header() -> String {
+    std::fs::read_to_string(root().join("include/blik.h")).unwrap()
+}
+
+/// The header without comments, its white space single blanks.
+fn bare() -> String {
+    let mut text = header();
+    while let Some(start) = text.find("/*") {
+        let end = text[start..].find("*/").unwrap() + start + 2;
+        text.replace_range(start..end, " ");
+    }
+    let lines = text.lines().filter(|l| !l.trim_start().starts_with('#'));
+    let lines = lines.map(|l| l.split("//").next().unwrap());
+    lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
+}
+
+/// Prototypes of all functions.
+fn prototypes() -> Vec<String> {
+    let bare = bare();
+    let statements = bare.split(';').map(|s| s.trim().trim_start_matches("extern \"C\" {").trim());
+    statements
+        .filter(|s| s.contains(" blik_") || s.contains("*blik_"))
+        .filter(|s| s.ends_with(')'))
+        .filter(|s| !s.starts_with("typedef"))
+        .map(String::from)
+        .collect()
+}
+
+fn name(prototype: &str) -> String {
+    let head = prototype.split('(').next().unwrap();
+    head.rsplit([' ', '*']).next().unwrap().to_string()
+}
+
+/// Symbols that a program can link with.
+fn symbols(arguments: &[&str], file: &str) -> BTreeSet<String> {
+    let output = Command::new("nm").args(arguments).arg(library().join(file)).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines().filter_map(|l| l.split_whitespace().nth(2)).map(String::from).collect()
+}
+
+#[test]
+fn symbols_are_what_the_header_declares() {
+    let declared: BTreeSet<String> = prototypes().iter().map(|p| name(p)).collect();
+    assert!(declared.len() > 30, "{declared:?}");
+    assert_eq!(symbols(&["-D", "--defined-only"], "libblik.so"), declared);
+    let archive: BTreeSet<String> = symbols(&["--defined-only", "-g"], "libblik.a");
+    let own: BTreeSet<String> = archive.into_iter().filter(|s| s.starts_with("blik_")).collect();
+    assert_eq!(own, declared);
+}
+
+/// Names and members of all structs.
+fn structs() -> Vec<(String, Vec<String>)> {
+    let bare = bare();
+    let mut all = Vec::new();
+    for part in bare.split("typedef struct ").skip(1) {
+        let (Some(open), Some(close)) = (part.find('{'), part.find('}')) else { continue };
+        if part.find(';').is_some_and(|end| end < open) {
+            continue; // an opaque one
+        }
+        let members = part[open + 1..close].split(';').map(str::trim).filter(|m| !m.is_empty());
+        let member = |m: &str| m.split('[').next().unwrap().rsplit([' ', '*']).next().unwrap().to_string();
+        all.push((part[..open].trim().to_string(), members.map(member).collect()));
+    }
+    all
+}
+
+/// Sizes and offsets as the C compiler has them, constants and prototypes as the header has them.
+fn interface() -> String {
+    let mut source = String::from("#include <blik.h>\n#include <stdio.h>\nint main(void) {\n");
+    for (name, members) in structs() {
+        source += &format!("    printf(\"struct {name}: %zu\\n\", sizeof({name}));\n");
+        for member in members {
+            let width = format!("sizeof((({name} *)0)->{member})");
+            source += &format!(
+                "    printf(\"    {member}: %zu + %zu\\n\", offsetof({name}, {member}), {width});\n"
+            );
+        }
+    }
+    source += "    return 0;\n}\n";
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("layout.c");
+    std::fs::write(&file, source).unwrap();
+    let program = folder.path().join("layout");
+    let mut command = Command::new("cc");
+    command.arg("-I").arg(root().join("include")).arg(&file).arg("-o").arg(&program);
+    let compiled = command.output().unwrap();
+    assert!(compiled.status.success(), "{}", text(&compiled));
+    let mut all = String::from_utf8(Command::new(&program).output().unwrap().stdout).unwrap();
+    let header = header();
+    let constants = header.lines().filter(|l| l.starts_with("#define BLIK_") && l.split(' ').count() == 3);
+    constants.filter(|l| !l.contains("VERSION")).for_each(|l| all += &format!("{l}\n"));
+    prototypes().iter().for_each(|p| all += &format!("{p}\n"));
+    all
+}
+
+/// Layouts are those of 64-bit machines; members added to a struct, other numbers, another prototype: all show.
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn the_interface_is_that_of_the_baseline() {
+    let path = root().join("tests/data/abi/x86_64.txt");
+    let now = interface();
+    if std::env::var_os("UPDATE_ABI").is_some() {
+        std::fs::write(&path, &now).unwrap();
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    let (now, kept): (BTreeSet<&str>, BTreeSet<&str>) = (now.lines().collect(), kept.lines().collect());
+    let gone: Vec<_> = kept.difference(&now).collect();
+    let new: Vec<_> = now.difference(&kept).collect();
+    assert!(gone.is_empty(), "the interface changed in a way that breaks programs; gone:\n{gone:#?}");
+    assert!(new.is_empty(), "UPDATE_ABI=1 cargo test --test c_library notes what is new:\n{new:#?}");
+}

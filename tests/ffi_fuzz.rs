@@ -1,0 +1,430 @@
+//! Baked blocks give the same bits as what they were baked from, and hostile ones are refused or do no harm; no numbers
+//! that a caller may hand over make the interface panic or give NaN. Seeded: every run tries the same; with
+//! `BLIK_FUZZ_SECONDS` it goes on for so long.
+
+use blik::*;
+use std::ffi::c_void;
+use std::mem::MaybeUninit;
+use std::ptr::{null, null_mut};
+use std::time::{Duration, Instant};
+
+/// A struct with the defaults that its init function sets.
+fn init<T>(init: unsafe extern "C" fn(*mut T)) -> T {
+    let mut value = MaybeUninit::uninit();
+    // SAFETY: the init function writes a whole value.
+    unsafe {
+        init(value.as_mut_ptr());
+        value.assume_init()
+    }
+}
+
+/// Memory on the boundary of blocks.
+#[derive(Clone)]
+struct Lines(Vec<Line>);
+
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Line([u64; 8]);
+
+impl Lines {
+    fn new(bytes: usize) -> Lines {
+        Lines(vec![Line([0; 8]); bytes.div_ceil(64)])
+    }
+
+    fn at(&mut self) -> *mut u8 {
+        assert!(self.0.iter().take(1).all(|line| line.0.as_ptr().align_offset(BLIK_BLOCK_ALIGNMENT) == 0));
+        self.0.as_mut_ptr().cast()
+    }
+
+    fn bytes(&mut self, size: usize) -> &mut [u8] {
+        // SAFETY: so many bytes there are.
+        unsafe { std::slice::from_raw_parts_mut(self.at(), size) }
+    }
+}
+
+/// xorshift64*
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d)
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() >> 33) as usize % count
+    }
+
+    /// A number that programs trip over, or an ordinary one.
+    fn number(&mut self) -> f64 {
+        const ODD: [f64; 16] = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            5e-324,
+            1e37,
+            1e-37,
+            1e150,
+            -1e300,
+            0.5,
+            2.0,
+        ];
+        match self.below(4) {
+            0 => ODD[self.below(ODD.len())],
+            1 => f64::from_bits(self.next()),
+            _ => (self.next() >> 11) as f64 / (1u64 << 52) as f64 - 1.0,
+        }
+    }
+}
+
+/// Vertices and facets of a floor, a mirror wall and a facet of no area.
+const VERTICES: [[f64; 3]; 6] =
+    [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.], [0., 1., 1.]];
+const FACETS: [[u32; 3]; 5] = [[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 5, 4], [1, 1, 2]];
+const MATERIALS: [u32; 5] = [0, 0, 1, 1, 0];
+
+/// The inputs of a run, to be changed at will.
+#[derive(Clone)]
+struct Inputs {
+    vertices: Vec<[f64; 3]>,
+    facets: Vec<[u32; 3]>,
+    facet_materials: Vec<u32>,
+    values: [[f64; 2]; 6],
+    gloss: [f64; 2],
+    gloss_rays: u32,
+    tolerance: f64,
+    max_bounces: i32,
+    radiance: [f64; 2],
+    model: i32,
+    up: [f64; 3],
+    sun: [f64; 3],
+    half_angle: f64,
+    camera: [f64; 10],
+    choices: [i32; 3],
+}
+
+impl Inputs {
+    fn new() -> Inputs {
+        Inputs {
+            vertices: VERTICES.to_vec(),
+            facets: FACETS.to_vec(),
+            facet_materials: MATERIALS.to_vec(),
+            values: [[0.5, 0.4], [0.0, 0.0], [0.0, 0.1], [0.1, 0.1], [0.5, 0.8], [0.0, 0.0]],
+            gloss: [0.0, 0.0],
+            gloss_rays: 0,
+            tolerance: 0.1,
+            max_bounces: -1,
+            radiance: [1.0, 0.5],
+            model: BLIK_SKY_OVERCAST,
+            up: [0.0, 0.0, 1.0],
+            sun: [1.0, 0.5, 2.0],
+            half_angle: 0.2665,
+            camera: [3.0, 0.5, 2.0, 0.5, 0.5, 0.3, 0.0, 0.0, 1.0, 2.0],
+            choices: [0, 0, 0],
+        }
+    }
+
+    /// Changes some of it.
+    fn spoil(&mut self, random: &mut Random) {
+        for _ in 0..1 + random.below(3) {
+            let x = random.number();
+            let odd = [0, 1, 5, 6, 7, 1000, u32::MAX, 1 << 31][random.below(8)];
+            match random.below(13) {
+                0 => self.vertices[random.below(6)][random.below(3)] = x,
+                1 => self.facets[random.below(5)][random.below(3)] = odd,
+                2 => self.facet_materials[random.below(5)] = odd,
+                3 => self.values[random.below(6)][random.below(2)] = x,
+                4 => self.gloss[random.below(2)] = x.abs() * 20.0,
+                5 => self.gloss_rays = odd,
+                6 => self.max_bounces = odd as i32,
+                7 => self.radiance[random.below(2)] = x,
+                8 => self.model = random.below(8) as i32 - 1,
+                9 => self.up[random.below(3)] = x,
+                10 => self.sun[random.below(3)] = x,
+                11 => self.half_angle = x,
+                _ => match random.below(3) {
+                    0 => self.choices[random.below(3)] = random.below(4) as i32 - 1,
+                    1 => self.tolerance = if x > 0.02 { x } else { -x },
+                    _ => self.camera[random.below(10)] = x,
+                },
+            }
+        }
+    }
+}
+
+/// Handles in memory of the library's own, ended when dropped.
+struct Handles {
+    scene: *mut blik_scene,
+    coupling: *mut blik_coupling,
+    solution: *mut blik_solution,
+}
+
+impl Drop for Handles {
+    fn drop(&mut self) {
+        // SAFETY: null or made by create, and used by nobody any more.
+        unsafe {
+            blik_solution_destroy(self.solution);
+            blik_coupling_destroy(self.coupling);
+            blik_scene_destroy(self.scene);
+        }
+    }
+}
+
+/// Refused for a reason of the caller's, or done.
+#[track_caller]
+fn refused(status: i32) -> bool {
+    assert!((BLIK_OK..BLIK_ERROR_INTERNAL).contains(&status), "status {status}");
+    status != BLIK_OK
+}
+
+/// The light of `inputs`, handed to `with`.
+fn with_light<R>(inputs: &Inputs, with: impl FnOnce(&blik_light) -> R) -> R {
+    let mut sky = init(blik_sky_init);
+    (sky.model, sky.radiance, sky.up) = (inputs.model, inputs.radiance.as_ptr(), inputs.up);
+    sky.sun_direction = inputs.sun;
+    let samples = [1.0f32; 8];
+    (sky.table, sky.table_rows, sky.table_columns) = (samples.as_ptr(), 2, 4);
+    let mut sun = init(blik_sun_init);
+    (sun.direction, sun.half_angle_deg) = (inputs.sun, inputs.half_angle);
+    with(&blik_light { sky: &sky, sun: &sun, ..init(blik_light_init) })
+}
+
+/// From the inputs to a solution, as far as it goes.
+fn prepare(inputs: &Inputs) -> Option<Handles> {
+    let [d0, s0, e0, d1, s1, e1] = inputs.values.each_ref().map(|v| v.as_ptr());
+    let material = |diffuse, specular, emission, ratio| blik_material {
+        diffuse,
+        specular,
+        emission,
+        gloss_axis_ratio: ratio,
+        gloss_rays: inputs.gloss_rays,
+    };
+    let materials = [material(d0, s0, e0, inputs.gloss[0]), material(d1, s1, e1, inputs.gloss[1])];
+    let mut mesh = init(blik_mesh_init);
+    (mesh.vertices.data, mesh.vertices.count) = (inputs.vertices.as_ptr().cast(), inputs.vertices.len());
+    (mesh.facets.data, mesh.facets.count) = (inputs.facets.as_ptr().cast(), inputs.facets.len());
+    mesh.facet_materials.data = inputs.facet_materials.as_ptr().cast();
+    mesh.facet_materials.count = inputs.facet_materials.len();
+    (mesh.materials, mesh.material_count, mesh.bands) = (materials.as_ptr(), 2, 2);
+    mesh.two_sided = inputs.choices[2];
+    let mut settings = init(blik_settings_init);
+    (settings.tolerance, settings.max_bounces) = (inputs.tolerance, inputs.max_bounces);
+    let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
+    // SAFETY: arrays as long as stated; what their numbers are is what is tested.
+    unsafe {
+        if refused(blik_scene_create(&mesh, null_mut(), &mut made.scene))
+            || refused(blik_coupling_create(made.scene, &settings, null(), null_mut(), &mut made.coupling))
+        {
+            return None;
+        }
+        let lit = |light: &blik_light| {
+            blik_solution_create(made.coupling, light, null(), null_mut(), &mut made.solution)
+        };
+        if refused(with_light(inputs, lit)) {
+            return None;
+        }
+    }
+    Some(made)
+}
+
+const PIXELS: usize = 6;
+
+/// The pixels that a camera sees, finite all.
+fn image(solution: *const blik_solution, inputs: &Inputs) -> Option<Vec<u32>> {
+    let mut camera = init(blik_camera_init);
+    let [a, b, c, d, e, f, g, h, i, size] = inputs.camera;
+    (camera.eye, camera.target, camera.up) = ([a, b, c], [d, e, f], [g, h, i]);
+    (camera.height, camera.fov_deg) = (size, size);
+    (camera.projection, camera.sampling) = (inputs.choices[0], inputs.choices[1]);
+    (camera.columns, camera.rows) = (PIXELS, PIXELS);
+    let mut pixels = vec![0f32; PIXELS * PIXELS * 2];
+    let (out, count) = (pixels.as_mut_ptr(), pixels.len());
+    // SAFETY: arrays as long as stated.
+    let status = unsafe {
+        blik_image(solution, &camera, null(), null_mut(), 0, null_mut(), out, count, null_mut(), null_mut())
+    };
+    if refused(status) {
+        return None;
+    }
+    assert!(pixels.iter().all(|p| p.is_finite()));
+    Some(pixels.iter().map(|p| p.to_bits()).collect())
+}
+
+/// A block of a solved scene.
+fn baked(made: &Handles) -> (Lines, usize) {
+    let mut size = 0;
+    // SAFETY: handles of this test; the block has the size asked for.
+    unsafe {
+        assert_eq!(blik_bake_size(made.coupling, made.solution, null_mut(), &mut size), BLIK_OK);
+        let mut block = Lines::new(size);
+        let at = block.at().cast();
+        assert_eq!(blik_bake(made.coupling, made.solution, at, size, null_mut()), BLIK_OK);
+        (block, size)
+    }
+}
+
+/// Loads a block and hands its handles to `with`.
+fn loaded<R>(
+    block: &mut Lines,
+    size: usize,
+    with: impl FnOnce(*const blik_scene, *const blik_coupling, *const blik_solution) -> R,
+) -> Result<R, i32> {
+    let (mut scene, mut coupling, mut solution, mut bytes) = (null(), null(), null(), 0);
+    let at = block.at().cast::<c_void>();
+    // SAFETY: the block has so many bytes, and outlives the handles.
+    unsafe {
+        let status = blik_load_size(at, size, null_mut(), &mut bytes);
+        if refused(status) {
+            return Err(status);
+        }
+        let mut memory = vec![0xa5u8; bytes];
+        let to = memory.as_mut_ptr().cast();
+        let status = blik_load(at, size, to, bytes, null_mut(), &mut scene, &mut coupling, &mut solution);
+        if refused(status) {
+            return Err(status);
+        }
+        Ok(with(scene, coupling, solution))
+    }
+}
+
+/// A solution of a loaded coupling under another light, and what it shows.
+fn relit(coupling: *const blik_coupling, inputs: &Inputs) -> Option<Vec<u32>> {
+    let mut solution = null_mut();
+    // SAFETY: a loaded coupling.
+    let lit = |light: &blik_light| unsafe {
+        blik_solution_create(coupling, light, null(), null_mut(), &mut solution)
+    };
+    if refused(with_light(inputs, lit)) {
+        return None;
+    }
+    let pixels = image(solution, inputs);
+    // SAFETY: just made, and used by nobody any more.
+    unsafe { blik_solution_destroy(solution) };
+    pixels
+}
+
+#[test]
+fn a_loaded_block_shows_and_relights_the_same_bits() {
+    let inputs = Inputs { gloss: [0.0, 9.0], ..Inputs::new() };
+    let made = prepare(&inputs).unwrap();
+    let (mut block, size) = baked(&made);
+    let other = Inputs { model: BLIK_SKY_TABLE, sun: [0.2, 0.9, 0.5], ..inputs.clone() };
+    let wanted = [image(made.solution, &inputs), relit(made.coupling, &other)];
+    assert!(wanted[0].is_some() && wanted[0] != wanted[1]);
+    // at another place, and again from what was loaded
+    for _ in 0..2 {
+        let mut moved = block.clone();
+        let shown = loaded(&mut moved, size, |scene, coupling, solution| {
+            // SAFETY: all are numbers; loaded handles.
+            let info = unsafe {
+                let mut info: blik_scene_info = std::mem::zeroed();
+                assert_eq!(blik_scene_get_info(scene, null_mut(), &mut info), BLIK_OK);
+                info
+            };
+            assert_eq!((info.facets, info.degenerate_facets, info.bands), (5, 1, 2));
+            let shown = [image(solution, &inputs), relit(coupling, &other)];
+            let again = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
+            let again = Handles { coupling: coupling.cast_mut(), solution: solution.cast_mut(), ..again };
+            let (block, size) = baked(&again);
+            std::mem::forget(again);
+            (shown, block, size)
+        });
+        let (shown, again, same) = shown.unwrap();
+        assert_eq!(shown, wanted);
+        assert_eq!(same, size);
+        block = again;
+    }
+}
+
+#[test]
+fn damaged_blocks_are_refused() {
+    let made = prepare(&Inputs::new()).unwrap();
+    let (block, size) = baked(&made);
+    let mut random = Random(77);
+    for _ in 0..500 {
+        let mut damaged = block.clone();
+        let at = random.below(size);
+        damaged.bytes(size)[at] ^= 1 << random.below(8);
+        assert_eq!(loaded(&mut damaged, size, |_, _, _| ()), Err(BLIK_ERROR_BLOCK), "byte {at}");
+    }
+    for cut in [8, 64, size / 2, size - 1] {
+        assert_eq!(loaded(&mut block.clone(), cut, |_, _, _| ()), Err(BLIK_ERROR_BLOCK), "{cut} bytes");
+    }
+}
+
+/// The block's checksum, made right after a change: what a forger would do.
+fn forge(bytes: &mut [u8]) {
+    let mut sum = 0x9e37_79b9_7f4a_7c15_u64;
+    for (at, word) in bytes.chunks_exact(8).enumerate() {
+        let word = if at == 3 { 0 } else { u64::from_ne_bytes(word.try_into().unwrap()) };
+        sum = (sum ^ word).wrapping_mul(0xff51_afd7_ed55_8ccd);
+        sum ^= sum >> 32;
+    }
+    bytes[24..32].copy_from_slice(&sum.to_ne_bytes());
+}
+
+/// How long fuzzing goes on beyond its fixed count.
+fn until() -> Instant {
+    let seconds = std::env::var("BLIK_FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(0);
+    Instant::now() + Duration::from_secs(seconds)
+}
+
+#[test]
+fn forged_blocks_do_no_harm() {
+    let inputs = Inputs::new();
+    let made = prepare(&inputs).unwrap();
+    let (block, size) = baked(&made);
+    let (end, mut random, mut accepted) = (until(), Random(1), 0);
+    let mut tries = 0;
+    while tries < 2000 || Instant::now() < end {
+        tries += 1;
+        let mut forged = block.clone();
+        let bytes = forged.bytes(size);
+        for _ in 0..1 + random.below(2) {
+            let at = random.below(size);
+            match random.below(3) {
+                0 => bytes[at] ^= 1 << random.below(8),
+                1 => bytes[at] = random.next() as u8,
+                _ => {
+                    let word = at & !7;
+                    let value = random.number().to_bits();
+                    bytes[word..word + 8].copy_from_slice(&value.to_ne_bytes());
+                }
+            }
+        }
+        forge(bytes);
+        let seen = loaded(&mut forged, size, |_, coupling, solution| {
+            image(solution, &inputs);
+            // beams of mirrors take most of the time: the sun shines now and then
+            if tries % 16 == 0 {
+                relit(coupling, &inputs);
+            }
+        });
+        accepted += u32::from(seen.is_ok());
+    }
+    // weights, light and the bytes between the arrays may be anything in their range
+    println!("{accepted} of {tries} forged blocks accepted");
+    assert!(accepted > 0 && accepted < tries, "{accepted} of {tries}");
+}
+
+#[test]
+fn odd_numbers_are_refused_or_shown_finite() {
+    let (end, mut random, mut shown, mut tries) = (until(), Random(2), 0, 0);
+    while tries < 400 || Instant::now() < end {
+        tries += 1;
+        let mut inputs = Inputs::new();
+        inputs.spoil(&mut random);
+        let Some(made) = prepare(&inputs) else { continue };
+        shown += u32::from(image(made.solution, &inputs).is_some());
+    }
+    println!("{shown} of {tries} inputs shown");
+    assert!(shown > 20, "{shown} of {tries}");
+}
