@@ -9,18 +9,19 @@ mod report;
 pub use report::*;
 
 use crate::arena::Memory;
-use crate::beam::{self, BeamSettings};
+use crate::beam;
 use crate::bvh::Bvh;
 use crate::camera::{Camera, CameraInput};
-use crate::chain::{ChainSettings, Solved};
+use crate::chain::Solved;
 use crate::coupling::rows::{RowSettings, fill};
 use crate::coupling::{Block, Coupling, sink};
 use crate::element::Elements;
-use crate::error::{Error, Field};
+use crate::error::Error;
 use crate::image::{self, Tally, Target};
 use crate::light::{self, Light, Shape};
 use crate::math::{FRAC_1_PI, Vec3};
-use crate::radiosity::{System, bound, sweeps};
+use crate::policy::{self, Sweeps};
+use crate::radiosity::System;
 use crate::scene::{Scene, SceneInput};
 use crate::signature::{self, Signature, Sums, View};
 use crate::simd::Isa;
@@ -136,9 +137,7 @@ impl Host {
         input: &SceneInput<'_>,
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
-        if !(1e-6..=0.1).contains(&settings.tolerance) {
-            return Err(Error::Range { field: Field::Tolerance, band: 0, value: settings.tolerance });
-        }
+        policy::check_tolerance(settings.tolerance)?;
         if let Some(reference) = &settings.reference_radiance {
             light::check_reference(reference, input.bands)?;
         }
@@ -171,8 +170,7 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        // a ray leaves a record where it is blocked and one at each facet that it meets
-        let unmerged = 4 * rows.rays as usize;
+        let unmerged = policy::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
             fill(&scene, &bvh, &elements, &rows, range, memory)
         })?;
@@ -226,13 +224,11 @@ impl Host {
             None => light.reference_radiance(scene, &mut reference),
         }
         let coupling = geometry.coupling()?;
-        // orders of reflection are kept apart only where their number is bounded, and small; one level counts all
-        let levels = geometry.settings.max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);
-        let shape = Shape { levels, bands };
+        let shape = policy::shape(geometry.settings.max_bounces, bands);
         let unknowns = elements.unknowns();
         let mut direct = std::vec![0.0; unknowns * shape.stride()];
         if let Some(sky) = &light.sky {
-            let accuracy = (0.05 * geometry.settings.tolerance).max(1e-9);
+            let accuracy = policy::sky_accuracy(geometry.settings.tolerance);
             self.split(&mut direct, shape.stride(), |range, out| {
                 light::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
             })?;
@@ -257,12 +253,10 @@ impl Host {
             shape,
         };
         let (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
-        // f32 images hold 3.4e38; a ninth of that leaves room for sums along a chain
-        if let Some(at) = radiance.iter().position(|l| l.is_nan() || *l > 1e37) {
-            return Err(Error::Range { field: Field::Emission, band: at % bands, value: radiance[at] });
-        }
-        let noise = noise(&coupling, at_stake(&system, &reference, &radiance));
-        let brightest = brightest(&light, &reference, &radiance);
+        policy::check_radiance(&radiance, bands)?;
+        let contrast = policy::at_stake(&system, &reference, &radiance);
+        let noise = coupling.rows(0..unknowns).map(|(_, r)| policy::noise(&r.row, contrast)).collect();
+        let brightest = policy::brightest(&light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
         Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, noise, brightest, report })
@@ -277,15 +271,10 @@ impl Host {
         table: &mut [f64],
     ) -> Result<u64, Error> {
         let scene = &geometry.scene;
-        let diffuse = scene.largest_diffuse() > 0.0 || geometry.settings.all_irradiances;
-        if scene.largest_specular() == 0.0 || !diffuse || geometry.settings.max_bounces == Some(0) {
+        let Settings { tolerance, max_bounces, all_irradiances, .. } = geometry.settings;
+        let Some(settings) = policy::beams(scene, sun, tolerance, max_bounces, all_irradiances) else {
             return Ok(0);
-        }
-        let tolerance = geometry.settings.tolerance;
-        let rays = (100.0 / tolerance).clamp(32768.0, 1e8);
-        let mirrors =
-            geometry.settings.max_bounces.unwrap_or(u32::MAX).min(crate::coupling::word::LONGEST as u32);
-        let settings = BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors);
+        };
         let rows = scene.facets() * scene.sides();
         let slabs = self.blocks(rows, 1024, scene.bands(), |range, memory| {
             beam::fill(scene, &geometry.bvh, &geometry.elements, sun, &settings, range, memory)
@@ -347,27 +336,16 @@ impl Host {
         let mut probe = std::vec![0u8; system.elements.unknowns()];
         let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
         let q = parts.into_iter().fold(0.0, f64::max);
-        let goal = 1e-3 * settings.tolerance;
-        let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
-        // a sweep adds a reflection, and so does what sees the radiances
-        let allowed = settings.max_bounces.map_or(u32::MAX, |b| b.saturating_sub(1));
+        let mut sweeps = Sweeps::new(q, settings.tolerance, settings.max_bounces);
         let mut next = radiance.clone();
-        let mut error = f64::INFINITY;
-        while error > goal && report.sweeps < allowed {
+        while sweeps.more() {
             let changes =
                 self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
-            let change = changes.into_iter().fold(0.0, f64::max);
             core::mem::swap(radiance, &mut next);
-            report.sweeps += 1;
-            error = bound(change, q);
-            if report.sweeps >= most {
-                if q >= 1.0 {
-                    return Err(Error::Diverges { row_sum: q });
-                }
-                break;
-            }
+            sweeps.took(changes.into_iter().fold(0.0, f64::max))?;
         }
-        Ok(error)
+        report.sweeps = sweeps.done;
+        Ok(sweeps.error)
     }
 
     /// Runs `work` over ranges of rows, each with its part of `out` (`stride` values a row), in parallel.
@@ -403,7 +381,7 @@ impl Host {
         let (signature, rays) = self.signature(lit, camera.forward())?;
         report.signature = signature;
         // the signature's rays: one toward each cell, the rest in chains
-        let cells = lit.geometry.settings.signature_cells().pow(2) as u64;
+        let cells = policy::signature_cells(lit.geometry.settings.tolerance).pow(2) as u64;
         report.rays.primary = tally.primary + cells;
         report.rays.chain += tally.chain + rays - cells;
         report.seconds.image = clock.lap();
@@ -448,7 +426,7 @@ impl Host {
     pub fn signature(&self, lit: &Lit<'_>, forward: Vec3) -> Result<(SignatureReport, u64), Error> {
         let solved = lit.solved();
         let bands = lit.shape.bands;
-        let view = View::new(&solved, forward, lit.geometry.settings.signature_cells())?;
+        let view = View::new(&solved, forward, policy::signature_cells(lit.geometry.settings.tolerance))?;
         let mut rows = std::vec![Sums::ZERO; view.rows()];
         self.split(&mut rows, 1, |range, out| signature::rows(&solved, &view, range, out))?;
         let mut sums = Sums::ZERO;
@@ -465,13 +443,6 @@ impl Host {
             contrast: (0..bands).map(|b| of(b).contrast).collect(),
         };
         Ok((report, sums.rays))
-    }
-}
-
-impl Settings {
-    /// Cells along each side of the signature's view: the outline's error, n^-3/2, a quarter of the tolerance.
-    fn signature_cells(&self) -> usize {
-        (crate::math::pow(0.25 * self.tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
     }
 }
 
@@ -516,11 +487,7 @@ impl Lit<'_> {
             noise: &self.noise,
             reference: &self.reference,
             brightest: self.brightest,
-            settings: ChainSettings {
-                cutoff: 0.05 * settings.tolerance,
-                max_bounces: settings.max_bounces,
-                tolerance: settings.tolerance,
-            },
+            settings: policy::chains(settings.tolerance, settings.max_bounces),
         }
     }
 
@@ -591,49 +558,6 @@ fn fill_piece(
         }
     }
     Ok(slabs)
-}
-
-/// Largest radiance that any ray can see, relative to the reference: sky and sun's disc, or diffuse radiance.
-fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
-    let bands = reference.len();
-    let mut largest = std::vec![0.0; bands];
-    light.largest_radiance(&mut largest);
-    if let Some(sun) = light.sun.as_ref().filter(|s| !s.is_point()) {
-        largest.iter_mut().enumerate().for_each(|(b, l)| *l += sun.disc_radiance(b));
-    }
-    for values in radiance.chunks_exact(bands) {
-        largest.iter_mut().zip(values).for_each(|(l, &v)| *l = f64::max(*l, v));
-    }
-    relative(&largest, reference)
-}
-
-/// What a ray of a row finds where it is not blocked, or where it is: the largest radiance of the sky or the root
-/// mean square of the diffuse radiance over the object's area, relative to the reference.
-fn at_stake(system: &System<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
-    let bands = reference.len();
-    let (mut sky, mut squares, mut area) = (std::vec![0.0; bands], std::vec![0.0; bands], 0.0);
-    system.light.largest_radiance(&mut sky);
-    for (unknown, values) in radiance.chunks_exact(bands).enumerate() {
-        let facet = system.elements.facet_of(unknown).0;
-        let own = system.scene.areas()[facet] * system.elements.share(facet);
-        area += own;
-        squares.iter_mut().zip(values).for_each(|(s, v)| *s += own * v * v);
-    }
-    for (l, s) in sky.iter_mut().zip(squares) {
-        *l = f64::max(*l, crate::math::sqrt(s / area.max(f64::MIN_POSITIVE)));
-    }
-    relative(&sky, reference)
-}
-
-/// Largest ratio over the bands that have a reference.
-fn relative(values: &[f64], reference: &[f64]) -> f64 {
-    values.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(v, r)| v / r).fold(0.0, f64::max)
-}
-
-/// Expected error of each row's irradiance over pi: half the difference between the halves of its rays is what
-/// their number leaves; three times that covers, on the reference scenes, what elements do not resolve.
-fn noise(coupling: &Coupling<'_>, contrast: f64) -> Vec<f32> {
-    coupling.rows(0..coupling.unknowns()).map(|(_, r)| (1.5 * r.row.spread * contrast) as f32).collect()
 }
 
 struct Clock(Instant);

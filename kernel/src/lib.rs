@@ -24,7 +24,8 @@
 //! | signature | [`signature`] | view | rays → radiant intensity, projected area, contrast |
 //! | plane model | [`plane`], all stages in two dimensions | | circles and polylines → image |
 //!
-//! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Beside them: [`form_factor`] and [`quadrature`],
+//! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Over them: [`policy`], what follows from the
+//! tolerance. Beside them: [`form_factor`] and [`quadrature`],
 //! exact form factors between points and polygons.
 //!
 //! # Where the paper's equations are
@@ -76,6 +77,7 @@ pub mod lobe;
 pub mod math;
 pub mod mirror;
 pub mod plane;
+pub mod policy;
 pub mod qmc;
 pub mod quadrature;
 pub mod radiosity;

@@ -123,14 +123,16 @@ pub fn solve_soup<R>(
     })
 }
 
-fn table(sky: &twin::Sky) -> Vec<f32> {
+/// The values of a sky table.
+pub fn table(sky: &twin::Sky) -> Vec<f32> {
     match &sky.model {
         twin::Model::Table { values, .. } => values.iter().map(|&v| v as f32).collect(),
         _ => Vec::new(),
     }
 }
 
-fn sky_input<'a>(sky: &'a twin::Sky, table: &'a [f32]) -> SkyInput<'a> {
+/// The sky as the kernel takes it; `table` from [`table`].
+pub fn sky_input<'a>(sky: &'a twin::Sky, table: &'a [f32]) -> SkyInput<'a> {
     let model = match &sky.model {
         twin::Model::Uniform => SkyModel::Uniform,
         twin::Model::Hemisphere => SkyModel::Hemisphere,

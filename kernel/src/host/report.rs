@@ -2,7 +2,7 @@
 
 use crate::coupling::{ABSENT, Coupling, OPEN};
 use crate::image::Tally;
-use crate::math::sqrt;
+use crate::policy;
 use std::vec::Vec;
 
 /// The keys of the program's `report.json`; seconds of reading and writing are the program's own.
@@ -125,17 +125,10 @@ impl Report {
 
     /// Puts the image's part in and draws the conclusions.
     pub(super) fn finish(&mut self, tally: &Tally) {
-        let pixels = tally.object_pixels.max(1) as f64;
-        let parts = [
-            ("visibility", sqrt(tally.noise2 / pixels)),
-            ("sampling", sqrt(tally.sampling2 / pixels)),
-            ("solver", self.certified.solver),
-            ("chain", tally.tail),
-        ];
         self.certified.chain_tail = tally.tail;
         self.certified.excludes = std::vec!["visibility", "light", "interpolation", "sampling"];
-        self.error_estimate = sqrt(parts.iter().map(|(_, e)| e * e).sum());
-        self.limited_by = parts.iter().fold(("nothing", 0.0), |a, &b| if b.1 > a.1 { b } else { a }).0;
+        let (error, limit) = policy::estimate(tally, self.certified.solver);
+        (self.error_estimate, self.limited_by) = (error, limit.name());
         self.tolerance_met = self.error_estimate <= self.tolerance;
     }
 }

@@ -1,0 +1,184 @@
+//! The calibration's cases: case i is the same in every run.
+
+use super::draw::Draw;
+use super::families::FAMILIES;
+use super::light::{Suns, lights};
+use crate::support::scenes::Mesh;
+use crate::support::twin::{Material, Scene, Sky, Sun};
+use blik_kernel::camera::{CameraInput, Projection, Sampling};
+use glam::{DVec3, dvec3};
+
+/// How many cases there are: thirteen of each kind.
+pub const CASES: usize = 13 * FAMILIES.len();
+
+/// From where a scene is looked at.
+#[derive(Clone, Copy, Debug)]
+pub enum Eye {
+    /// From 10 to 70 degrees above.
+    Outside,
+    /// From any side.
+    Around,
+    /// From 40 to 85 degrees above.
+    Above,
+    /// From the octant x, y, z > 0.
+    Octant,
+    /// From within a room of this size on z = 0.
+    Within(DVec3),
+}
+
+/// A kind's scene before light and camera are drawn.
+pub struct Setting {
+    mesh: Mesh,
+    materials: Vec<Material>,
+    two_sided: bool,
+    sun: f64,
+    suns: Suns,
+    dark: bool,
+    rough: bool,
+    eye: Eye,
+}
+
+impl Setting {
+    /// One-sided, seen from outside, half the time in the sun.
+    pub fn new(mesh: Mesh, materials: Vec<Material>) -> Setting {
+        let (suns, eye) = (Suns::Any, Eye::Outside);
+        Setting { mesh, materials, two_sided: false, sun: 0.5, suns, dark: false, rough: false, eye }
+    }
+
+    /// With a sun with the probability `p`.
+    pub fn sun(self, p: f64) -> Setting {
+        Setting { sun: p, ..self }
+    }
+
+    /// With suns of this kind.
+    pub fn suns(self, suns: Suns) -> Setting {
+        Setting { suns, ..self }
+    }
+
+    /// Seen from there.
+    pub fn eye(self, eye: Eye) -> Setting {
+        Setting { eye, ..self }
+    }
+
+    /// Both sides alike.
+    pub fn two_sided(self) -> Setting {
+        Setting { two_sided: true, ..self }
+    }
+
+    /// Without sky and sun.
+    pub fn dark(self) -> Setting {
+        Setting { dark: true, ..self }
+    }
+
+    /// Too noisy a reference for the smallest tolerance.
+    pub fn rough(self) -> Setting {
+        Setting { rough: true, ..self }
+    }
+}
+
+/// A scene, its light, a view and a tolerance.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Its number.
+    pub index: usize,
+    /// Its kind.
+    pub family: &'static str,
+    /// Facets.
+    pub mesh: Mesh,
+    /// Material of each index that the mesh names.
+    pub materials: Vec<Material>,
+    /// Whether backs are like fronts.
+    pub two_sided: bool,
+    /// The sky, if any.
+    pub sky: Option<Sky>,
+    /// The sun, if any.
+    pub sun: Option<Sun>,
+    /// The view.
+    pub camera: CameraInput,
+    /// The error asked for.
+    pub tolerance: f64,
+}
+
+impl Case {
+    /// Case `index`, below [`CASES`].
+    pub fn new(index: usize) -> Case {
+        let mut draw = Draw::new(index);
+        let (family, build) = FAMILIES[index % FAMILIES.len()];
+        let bands = if draw.chance(0.3) { 3 } else { 1 };
+        let setting = build(&mut draw, bands);
+        let (sky, sun) =
+            if setting.dark { (None, None) } else { lights(&mut draw, bands, setting.sun, setting.suns) };
+        let tolerance = match draw.whole(0, 9) {
+            0..=2 => 1e-2,
+            3..=7 => 2e-3,
+            _ if setting.rough => 2e-3,
+            _ => 5e-4,
+        };
+        let camera = camera(&mut draw, &setting);
+        let Setting { mesh, materials, two_sided, .. } = setting;
+        Case { index, family, mesh, materials, two_sided, sky, sun, camera, tolerance }
+    }
+
+    /// The scene as the twin and the judge take it, without the images of the sun that the twin alone needs.
+    pub fn scene(&self) -> Scene {
+        let mut scene = Scene::new(&self.mesh, &self.materials).two_sided(self.two_sided);
+        (scene.sky, scene.sun) = (self.sky.clone(), self.sun.clone());
+        scene
+    }
+
+    /// Light, sides, bands and sampling in a word each.
+    pub fn summary(&self) -> String {
+        let sky = self.sky.as_ref().map_or("no sky".into(), |s| {
+            format!("{:?}", s.model).split([' ', '{']).next().unwrap_or_default().to_lowercase()
+        });
+        let sun = match self.sun.as_ref().map(|s| s.half_angle.to_degrees()) {
+            None => "no sun".into(),
+            Some(0.0) => "point sun".into(),
+            Some(degrees) => format!("sun {degrees:.2} deg"),
+        };
+        let sides = if self.two_sided { "two-sided" } else { "one-sided" };
+        let bands = self.materials[0].diffuse.len();
+        let view = match self.camera.projection {
+            Projection::Orthographic { .. } => "orthographic",
+            Projection::Perspective { .. } => "perspective",
+        };
+        format!("{sky}; {sun}; {sides}; {bands} band; {view}; {:?}", self.camera.sampling).to_lowercase()
+    }
+}
+
+fn camera(draw: &mut Draw, setting: &Setting) -> CameraInput {
+    let points = || setting.mesh.vertices.iter().map(|v| DVec3::from(*v));
+    let low = points().fold(DVec3::INFINITY, DVec3::min);
+    let high = points().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let (middle, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
+    let perspective = draw.chance(0.5) || matches!(setting.eye, Eye::Within(_));
+    let side = draw.whole(20, 32);
+    let (columns, rows) = (side + draw.whole(0, 8), side);
+    let sampling = draw.pick(&[Sampling::Area, Sampling::Centre]);
+    let fov_deg =
+        if matches!(setting.eye, Eye::Within(_)) { draw.real(50.0, 95.0) } else { draw.real(15.0, 50.0) };
+    let direction = match setting.eye {
+        Eye::Outside => draw.direction(10.0, 70.0),
+        Eye::Around => draw.direction(-50.0, 70.0),
+        Eye::Above => draw.direction(40.0, 85.0),
+        Eye::Octant => draw.point(0.3, 1.0).normalize(),
+        Eye::Within(_) => DVec3::Z,
+    };
+    let (eye, target) = match setting.eye {
+        Eye::Within(size) => {
+            let inside = dvec3(0.42, 0.42, 0.85) * size;
+            let at = dvec3(-inside.x, draw.real(-inside.y, inside.y), draw.real(0.5, 1.0) * inside.z);
+            (at, dvec3(inside.x, draw.real(-inside.y, inside.y), draw.real(0.0, 0.6) * inside.z))
+        }
+        _ => {
+            let target = middle + draw.point(-0.15, 0.15) * radius;
+            let away = draw.real(0.9, 1.2) * radius / (fov_deg.to_radians() / 2.0).sin();
+            (target + direction * if perspective { away } else { 4.0 * radius }, target)
+        }
+    };
+    let height = draw.real(1.1, 1.8) * radius;
+    let projection =
+        if perspective { Projection::Perspective { fov_deg } } else { Projection::Orthographic { height } };
+    let target = target.to_array();
+    CameraInput { projection, eye: eye.to_array(), target, up: [0.0, 0.0, 1.0], columns, rows, sampling }
+}

@@ -1,0 +1,209 @@
+//! What the stages follow from the one number that the caller states, and what the error estimate is made of.
+//!
+//! Every layer over the kernel (the owning one, the C interface, bare metal) decides here, so that all compute the
+//! same bits.
+
+use crate::beam::BeamSettings;
+use crate::chain::ChainSettings;
+use crate::coupling::Row;
+use crate::coupling::rows::RowSettings;
+use crate::coupling::word::LONGEST;
+use crate::error::{Error, Field};
+use crate::image::Tally;
+use crate::light::{Light, Shape};
+use crate::math::{pow, sqrt};
+use crate::radiosity::{System, bound, sweeps};
+use crate::scene::{MAX_BANDS, Scene};
+use crate::sun::Sun;
+
+/// Refuses a tolerance outside 1e-6 to 0.1.
+pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {
+    if (1e-6..=0.1).contains(&tolerance) {
+        Ok(())
+    } else {
+        Err(Error::Range { field: Field::Tolerance, band: 0, value: tolerance })
+    }
+}
+
+/// Records that a row of the coupling may need while it grows: a ray leaves one where it is blocked and one at each
+/// facet that it meets.
+pub fn unmerged(rows: &RowSettings) -> usize {
+    4 * rows.rays as usize
+}
+
+/// Relative error of the sky's irradiance on a plane.
+pub fn sky_accuracy(tolerance: f64) -> f64 {
+    (0.05 * tolerance).max(1e-9)
+}
+
+/// Orders of reflection are kept apart only where their number is bounded, and small; one level counts all.
+pub fn shape(max_bounces: Option<u32>, bands: usize) -> Shape {
+    let levels = max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);
+    Shape { levels, bands }
+}
+
+/// How the beams that mirrors throw are traced; `None` where the scene has no use for them.
+pub fn beams(
+    scene: &Scene<'_>,
+    sun: &Sun<'_>,
+    tolerance: f64,
+    max_bounces: Option<u32>,
+    all_irradiances: bool,
+) -> Option<BeamSettings> {
+    let diffuse = scene.largest_diffuse() > 0.0 || all_irradiances;
+    if scene.largest_specular() == 0.0 || !diffuse || max_bounces == Some(0) {
+        return None;
+    }
+    let rays = (100.0 / tolerance).clamp(32768.0, 1e8);
+    let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
+    Some(BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors))
+}
+
+/// How far specular chains are followed.
+pub fn chains(tolerance: f64, max_bounces: Option<u32>) -> ChainSettings {
+    ChainSettings { cutoff: 0.05 * tolerance, max_bounces, tolerance }
+}
+
+/// Cells along each side of a signature's view: the outline's error, n^-3/2, a quarter of the tolerance.
+pub fn signature_cells(tolerance: f64) -> usize {
+    (pow(0.25 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
+}
+
+/// When the sweeps over the linear system end: as soon as the bound on their error is a small part of the tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweeps {
+    /// Sweeps done.
+    pub done: u32,
+    /// Bound on the radiances' error, relative to the reference radiance.
+    pub error: f64,
+    q: f64,
+    goal: f64,
+    most: u32,
+    allowed: u32,
+}
+
+impl Sweeps {
+    /// Before the first sweep of a system of contraction `q` (the largest over all rows).
+    pub fn new(q: f64, tolerance: f64, max_bounces: Option<u32>) -> Sweeps {
+        let goal = 1e-3 * tolerance;
+        let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
+        // a sweep adds a reflection, and so does what sees the radiances
+        let allowed = max_bounces.map_or(u32::MAX, |b| b.saturating_sub(1));
+        Sweeps { done: 0, error: f64::INFINITY, q, goal, most, allowed }
+    }
+
+    /// True where another sweep is wanted.
+    pub fn more(&self) -> bool {
+        self.error > self.goal && self.done < self.allowed.min(self.most)
+    }
+
+    /// Notes a sweep that changed the radiances by at most `change`.
+    ///
+    /// # Errors
+    /// [`Error::Diverges`] where the last sweep allowed did not end it and nothing bounds the rest.
+    pub fn took(&mut self, change: f64) -> Result<(), Error> {
+        self.done += 1;
+        self.error = bound(change, self.q);
+        if self.done >= self.most && self.q >= 1.0 {
+            return Err(Error::Diverges { row_sum: self.q });
+        }
+        Ok(())
+    }
+}
+
+/// Refuses radiances above 1e37: f32 images hold 3.4e38, and a ninth of that leaves room for sums along a chain.
+pub fn check_radiance(radiance: &[f64], bands: usize) -> Result<(), Error> {
+    match radiance.iter().enumerate().find(|(_, l)| l.is_nan() || **l > 1e37) {
+        Some((at, &value)) => Err(Error::Range { field: Field::Emission, band: at % bands.max(1), value }),
+        None => Ok(()),
+    }
+}
+
+/// Largest radiance that any ray can see, relative to the reference: sky and sun's disc, or diffuse radiance.
+pub fn brightest(light: &Light<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
+    let bands = reference.len().clamp(1, MAX_BANDS);
+    let mut all = [0.0; MAX_BANDS];
+    let (largest, _) = all.split_at_mut(bands);
+    light.largest_radiance(largest);
+    if let Some(sun) = light.sun.as_ref().filter(|s| !s.is_point()) {
+        largest.iter_mut().enumerate().for_each(|(b, l)| *l += sun.disc_radiance(b));
+    }
+    for values in radiance.chunks_exact(bands) {
+        largest.iter_mut().zip(values).for_each(|(l, &v)| *l = f64::max(*l, v));
+    }
+    relative(largest, reference)
+}
+
+/// What a ray of a row finds where it is not blocked, or where it is: the largest radiance of the sky or the root
+/// mean square of the diffuse radiance over the object's area, relative to the reference.
+pub fn at_stake(system: &System<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
+    let bands = reference.len().clamp(1, MAX_BANDS);
+    let (mut all, mut squares, mut area) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS], 0.0);
+    let (sky, _) = all.split_at_mut(bands);
+    system.light.largest_radiance(sky);
+    for (unknown, values) in radiance.chunks_exact(bands).enumerate() {
+        let facet = system.elements.facet_of(unknown).0;
+        let own = system.scene.areas().get(facet).copied().unwrap_or(0.0) * system.elements.share(facet);
+        area += own;
+        squares.iter_mut().zip(values).for_each(|(s, v)| *s += own * v * v);
+    }
+    for (l, s) in sky.iter_mut().zip(squares) {
+        *l = f64::max(*l, sqrt(s / area.max(f64::MIN_POSITIVE)));
+    }
+    relative(sky, reference)
+}
+
+/// Largest ratio over the bands that have a reference.
+fn relative(values: &[f64], reference: &[f64]) -> f64 {
+    values.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(v, r)| v / r).fold(0.0, f64::max)
+}
+
+/// Expected error of a row's irradiance over pi: half the difference between the halves of its rays is what their
+/// number leaves; three times that covers, on the reference scenes, what elements do not resolve.
+pub fn noise(row: &Row, contrast: f64) -> f32 {
+    (1.5 * row.spread * contrast) as f32
+}
+
+/// The largest part of an error estimate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Limit {
+    /// The estimate is 0.
+    #[default]
+    Nothing,
+    /// Rays and elements of the diffuse solution.
+    Visibility,
+    /// Rays through pixels.
+    Sampling,
+    /// The sweeps that were not done.
+    Solver,
+    /// Chains that were cut.
+    Chain,
+}
+
+impl Limit {
+    /// The word for reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Limit::Nothing => "nothing",
+            Limit::Visibility => "visibility",
+            Limit::Sampling => "sampling",
+            Limit::Solver => "solver",
+            Limit::Chain => "chain",
+        }
+    }
+}
+
+/// Expected eps of eq. 16 of an image, relative to the reference radiance, and its largest part: `tally` of all its
+/// rows, `solver` the bound on the radiances' error.
+pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
+    let pixels = tally.object_pixels.max(1) as f64;
+    let parts = [
+        (Limit::Visibility, sqrt(tally.noise2 / pixels)),
+        (Limit::Sampling, sqrt(tally.sampling2 / pixels)),
+        (Limit::Solver, solver),
+        (Limit::Chain, tally.tail),
+    ];
+    let sum: f64 = parts.iter().map(|(_, e)| e * e).sum();
+    let largest = parts.iter().fold((Limit::Nothing, 0.0), |a, &b| if b.1 > a.1 { b } else { a });
+    (sqrt(sum), largest.0)
+}
