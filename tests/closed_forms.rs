@@ -6,7 +6,7 @@
 mod kernel;
 mod support;
 
-use blik_kernel::coupling::BLOCKED;
+use blik_kernel::coupling::{BLOCKED, ENCLOSED};
 use blik_kernel::form_factor::polygon_to_polygon;
 use blik_kernel::host::{Geometry, Settings};
 use blik_kernel::math::Vec3;
@@ -240,7 +240,7 @@ fn by_quads(geometry: &Geometry<'_>, quads: usize) -> (Vec<Vec<f64>>, Vec<f64>) 
             let source = elements.facet_of(record.unknown()).0 / 2;
             factors[quad][source] += share * record.weight * row.products(record)[0];
         }
-        light[quad] += share;
+        light[quad] += if row.row.state == ENCLOSED { 0.0 } else { share };
         for record in row.escapes {
             let factor = if record.word() == BLOCKED { -1.0 } else { row.products(record)[0] };
             light[quad] += share * record.weight * factor;

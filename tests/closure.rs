@@ -4,7 +4,7 @@
 mod case;
 mod support;
 
-use blik_kernel::coupling::{ABSENT, BLOCKED, RowView};
+use blik_kernel::coupling::{ABSENT, RowView};
 use case::{Case, within};
 use std::collections::HashMap;
 use support::scenes::{self, Mesh};
@@ -21,7 +21,7 @@ fn shares(row: &RowView<'_>) -> Shares {
     let sum = |records: &mut dyn Iterator<Item = f64>| records.sum::<f64>();
     Shares {
         straight: sum(&mut row.targets.iter().filter(|r| row.depth(r) == 0).map(|r| r.weight)),
-        blocked: sum(&mut row.escapes.iter().filter(|r| r.word() == BLOCKED).map(|r| r.weight)),
+        blocked: row.blocked(),
         mirrored: sum(&mut row
             .targets
             .iter()
@@ -30,7 +30,7 @@ fn shares(row: &RowView<'_>) -> Shares {
             + sum(&mut row
                 .escapes
                 .iter()
-                .filter(|r| r.word() != BLOCKED)
+                .filter(|r| row.depth(r) > 0)
                 .map(|r| r.weight * row.products(r)[0])),
     }
 }
@@ -97,7 +97,7 @@ fn rows_through_mirrors_close_too() {
                     let specular = geometry.scene().specular(geometry.scene().material(facet))[0];
                     r.weight * row.products(r)[0] * (1.0 - specular)
                 });
-                let through = row.escapes.iter().filter(|r| r.word() != BLOCKED);
+                let through = row.escapes.iter().filter(|r| row.depth(r) > 0);
                 let through: f64 = through.map(|r| r.weight * row.products(r)[0]).sum();
                 let s = shares(&row);
                 mirrored = mirrored.max(s.mirrored);

@@ -308,10 +308,10 @@ fn memory_of_the_wrong_size() {
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     let needed = Elements::bytes(&[1, 2]).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
-    let error = Elements::new(&scene, &[1, 2], &mut small).unwrap_err();
+    let error = Elements::new(&scene, &[1, 2], &[], &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
-    let error = Elements::new(&scene, &[1], &mut small).unwrap_err();
+    let error = Elements::new(&scene, &[1], &[], &mut small).unwrap_err();
     is(error, Error::Length { what: "divisions", expected: 2, given: 1 }, &["divisions"]);
     assert!(matches!(Block::open(&[]).unwrap_err(), Error::BufferTooSmall { given: 0, .. }));
     // as many elements as an index holds: 4096 for each of 2^18 facets
@@ -378,7 +378,7 @@ fn outputs_of_the_wrong_size() {
         assert!(sums.iter().all(|s| s.area == 7.0));
 
         let mut values = [7.0; 5];
-        let error = subdivide::probe(solved.scene, solved.bvh, 0..6, &mut values).unwrap_err();
+        let error = subdivide::probe(solved.scene, solved.bvh, 16, 0..6, &mut values).unwrap_err();
         is(error, Error::Length { what: "unevenness", expected: 6, given: 5 }, &["unevenness"]);
         let mut divisions = [7; 6];
         let error = subdivide::divisions(solved.scene, &values, 1e-3, &mut divisions).unwrap_err();
@@ -429,7 +429,8 @@ fn stages_of_different_scenes() {
         );
         let sun = SunInput { direction: [0.0, 0.0, 1.0], irradiance: &[1.0], half_angle_deg: 0.0 };
         let sun = Sun::new(&sun, 1).unwrap();
-        let error = light::sun_rows(scene, few.bvh(), elements, &sun, all.clone(), &mut table[..1]);
+        let error =
+            light::sun_rows(scene, few.bvh(), elements, &coupling, &sun, all.clone(), &mut table[..1]);
         let expected = Error::Length { what: "sun table", expected: all.len(), given: 1 };
         is(error.unwrap_err(), expected, &["sun table"]);
         assert!(table.iter().all(|&x| x == 7.0));

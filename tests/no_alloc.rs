@@ -154,14 +154,17 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         short("tree", bytes, |memory| Bvh::build_obvhs(corners, areas, Isa::BASELINE, memory).err());
         let mut memory = vec![0; bytes];
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
-        wrong("unevenness", facets, f64::MAX, |out| subdivide::probe(&scene, &bvh, 0..facets, out).err());
+        wrong("unevenness", facets, f64::MAX, |out| subdivide::probe(&scene, &bvh, 16, 0..facets, out).err());
         let uneven = vec![0.1; facets];
         wrong("divisions", facets, 77, |out| subdivide::divisions(&scene, &uneven, 1e-2, out).err());
         let divisions = vec![2; facets];
         let bytes = Elements::bytes(&divisions).unwrap();
-        short("elements", bytes, |memory| Elements::new(&scene, &divisions, memory).err());
+        short("elements", bytes, |memory| Elements::new(&scene, &divisions, &[], memory).err());
         let mut memory = vec![0; bytes];
-        assert!(matches!(Elements::new(&scene, &divisions[1..], &mut memory), Err(Error::Length { .. })));
+        assert!(matches!(
+            Elements::new(&scene, &divisions[1..], &[], &mut memory),
+            Err(Error::Length { .. })
+        ));
     });
 }
 
@@ -229,7 +232,9 @@ fn light_solution_image_and_signature_refuse_tables_of_the_wrong_size() {
         wrong("sky", table, f64::MAX, |out| {
             light::sky_rows(scene, elements, coupling, sky, 1e-3, 0..n, shape, out).err()
         });
-        wrong("sun", n, f64::MAX, |out| light::sun_rows(scene, bvh, elements, sun, 0..n, out).err());
+        wrong("sun", n, f64::MAX, |out| {
+            light::sun_rows(scene, bvh, elements, coupling, sun, 0..n, out).err()
+        });
         let radiance = vec![0.5; n * shape.bands];
         wrong("irradiance", table, f64::MAX, |out| system.gather(0..n, 0, |_| &radiance, out).err());
 

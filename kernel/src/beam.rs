@@ -97,7 +97,7 @@ impl Tracer<'_, '_> {
         let (facet, side) = (row / self.scene.sides(), row % self.scene.sides());
         let area = seen_area(self.scene, self.sun, facet, side);
         if area <= 0.0 {
-            self.sink.end_row(0.0, Row::default());
+            self.sink.end_row(Row::default(), Some);
             return Some(());
         }
         let wanted = (area * self.settings.density).clamp(RAYS.0, RAYS.1);
@@ -107,7 +107,8 @@ impl Tracer<'_, '_> {
         for index in 0..rays {
             self.ray(facet, side, &sequence, index, &mut stats)?;
         }
-        self.sink.end_row(1.0 / f64::from(rays), stats);
+        let share = 1.0 / f64::from(rays);
+        self.sink.end_row(stats, |record| Some(Record { weight: share * record.weight, ..record }));
         Some(())
     }
 
@@ -157,7 +158,7 @@ impl Tracer<'_, '_> {
             arrival = Some(direction);
             let (target, _) = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
             let area = scene.areas()[surface.facet] * self.elements.share(surface.facet);
-            self.sink.push(Record::target(target, word, flux / area, (0.0, 0.0)))?;
+            self.sink.push(Record::target(target, word, flux / area, [0.0; 2]))?;
         }
     }
 }
@@ -174,14 +175,19 @@ fn turned(normal: Vec3, leaving: Vec3, arrival: Option<Vec3>, flat: bool) -> f64
     }
 }
 
-/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors.
-pub fn add(beams: &Coupling<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) {
+/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors; what falls on an element
+/// falls on the part of it that is not inside a body.
+pub fn add(beams: &Coupling<'_>, coupling: &Coupling<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) {
     for (_, row) in beams.rows(0..beams.unknowns()) {
         for record in row.targets {
+            let exposed = f64::from(coupling.row(record.unknown()).exposed);
+            if exposed == 0.0 {
+                continue;
+            }
             for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record), l)) {
                 let Some(mean) = table.get_mut(shape.at(record.unknown(), level)) else { continue };
                 for (band, (e, product)) in mean.iter_mut().zip(row.products(record)).enumerate() {
-                    *e += sun.irradiance(band) * product * record.weight;
+                    *e += sun.irradiance(band) * product * (record.weight / exposed);
                 }
             }
         }

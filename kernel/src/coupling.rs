@@ -33,18 +33,18 @@ plain_struct! {
         pub start: u32,
         /// First escape among the records.
         pub escapes: u32,
-        /// [`ABSENT`], [`OPEN`] or [`TRACED`].
+        /// [`ABSENT`], [`OPEN`], [`TRACED`] or [`ENCLOSED`].
         pub state: u32,
         /// Rays traced.
         pub rays: u32,
         /// Rays traced beyond the first hits.
         pub chain_rays: u32,
-        /// Keeps the size a multiple of eight.
-        pub unused: u32,
+        /// Share of the element that is not inside a body, where nothing sees it; the row is that part's mean.
+        pub exposed: f32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
         /// Difference between the two halves of the row's rays, as a share of the hemisphere: in what is blocked, or in
-        /// which facets block it.
+        /// which facets block it; and how far light departs from a linear function over the element.
         pub spread: f64,
     }
 }
@@ -53,8 +53,10 @@ plain_struct! {
 pub const ABSENT: u32 = 0;
 /// State of a row that sees nothing but the sky: nothing rises above its facet's plane.
 pub const OPEN: u32 = 1;
-/// State of a row whose rays were traced.
+/// State of a row whose rays were traced; its escapes hold what is blocked, to be taken off the whole sky.
 pub const TRACED: u32 = 2;
+/// State of a row whose rays were traced and mostly met facets; its escapes hold what is open instead.
+pub const ENCLOSED: u32 = 3;
 
 plain_struct! {
     /// The head of a block.
@@ -86,23 +88,15 @@ pub const BLOCKED: u16 = u16::MAX;
 impl Record {
     /// A target seen along a word.
     #[inline(always)]
-    pub fn target(unknown: usize, word: u16, weight: f64, gradient: (f64, f64)) -> Record {
-        Record {
-            key: (unknown as u64) << 16 | u64::from(word),
-            weight,
-            gradient: [gradient.0 as f32, gradient.1 as f32],
-        }
+    pub fn target(unknown: usize, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
+        Record { key: (unknown as u64) << 16 | u64::from(word), weight, gradient }
     }
 
     /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
     #[inline(always)]
-    pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: (f64, f64)) -> Record {
+    pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
         let packed = direction.map_or(0, pack);
-        Record {
-            key: ESCAPE | packed << 16 | u64::from(word),
-            weight,
-            gradient: [gradient.0 as f32, gradient.1 as f32],
-        }
+        Record { key: ESCAPE | packed << 16 | u64::from(word), weight, gradient }
     }
 
     /// The word.
@@ -212,7 +206,8 @@ pub struct RowView<'m> {
     pub row: Row,
     /// Terms with a target.
     pub targets: &'m [Record],
-    /// Terms that end in the sky, and the blocked part of the hemisphere.
+    /// Terms that end in the sky by way of mirrors, and the blocked or (where the row is [`ENCLOSED`]) the open part
+    /// of the hemisphere.
     pub escapes: &'m [Record],
     words: &'m [Word],
     products: &'m [f64],
@@ -220,6 +215,14 @@ pub struct RowView<'m> {
 }
 
 impl<'m> RowView<'m> {
+    /// Share of the hemisphere in which straight rays meet facets.
+    pub fn blocked(&self) -> f64 {
+        let enclosed = self.row.state == ENCLOSED;
+        let word = if enclosed { word::EMPTY } else { BLOCKED };
+        let kept = self.escapes.iter().filter(|r| r.word() == word).map(|r| r.weight).sum();
+        if enclosed { 1.0 - kept } else { kept }
+    }
+
     /// Products of the mirror reflectances of a record's word, one per band.
     #[inline(always)]
     pub fn products(&self, record: &Record) -> &'m [f64] {
@@ -278,6 +281,12 @@ impl<'m> Coupling<'m> {
                 let part = block.range().start.max(range.start)..block.range().end.min(range.end);
                 part.map(move |unknown| (unknown, row_of(block, unknown)))
             })
+    }
+
+    /// One row; an empty one of state [`ABSENT`] beyond the last.
+    pub fn row(&self, unknown: usize) -> Row {
+        let block = self.blocks.get(self.blocks.partition_point(|b| b.range().end <= unknown));
+        block.and_then(|b| b.rows.get(unknown - b.range().start)).copied().unwrap_or_default()
     }
 
     /// Bytes in use.

@@ -5,7 +5,7 @@
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
-use crate::math::Vec3;
+use crate::math::{Vec3, sqrt};
 use crate::scene::Scene;
 
 /// The finest cut of one facet: 64^2 elements.
@@ -17,6 +17,7 @@ pub struct Elements<'m> {
     first: &'m [u32],
     divisions: &'m [u32],
     facet: &'m [u32],
+    roughness: &'m [f32],
     sides: usize,
     memory: usize,
 }
@@ -28,11 +29,19 @@ impl<'m> Elements<'m> {
     /// Bytes for facets cut as `divisions` says.
     pub fn bytes(divisions: &[u32]) -> Result<usize, Error> {
         let elements = count(divisions)?;
-        Need::new().and::<u32>(divisions.len() + 1).and::<u32>(divisions.len()).and::<u32>(elements).bytes()
+        let facets = divisions.len();
+        Need::new().and::<u32>(facets + 1).and::<u32>(facets).and::<u32>(elements).and::<f32>(facets).bytes()
     }
 
     /// Cuts each facet's edges into `divisions` parts (1 to [`MAX_DIVISIONS`]; degenerate facets: 1).
-    pub fn new(scene: &Scene<'_>, divisions: &[u32], memory: &'m mut [u8]) -> Result<Elements<'m>, Error> {
+    ///
+    /// `unevenness` is what [`crate::subdivide::probe`] found, by facet; empty: nothing is known of it.
+    pub fn new(
+        scene: &Scene<'_>,
+        divisions: &[u32],
+        unevenness: &[f64],
+        memory: &'m mut [u8],
+    ) -> Result<Elements<'m>, Error> {
         if divisions.len() != scene.facets() {
             let (expected, given) = (scene.facets(), divisions.len());
             return Err(Error::Length { what: "divisions", expected, given });
@@ -43,6 +52,10 @@ impl<'m> Elements<'m> {
         let first = arena.take::<u32>(divisions.len() + 1)?;
         let kept = arena.take::<u32>(divisions.len())?;
         let facet = arena.take::<u32>(elements)?;
+        let roughness = arena.take::<f32>(divisions.len())?;
+        for ((r, &v), &s) in roughness.iter_mut().zip(unevenness).zip(divisions) {
+            *r = sqrt((v / f64::from(s.max(1))).max(0.0)) as f32;
+        }
         let mut at = 0;
         for (f, &s) in divisions.iter().enumerate() {
             let s = s.clamp(1, MAX_DIVISIONS);
@@ -52,7 +65,7 @@ impl<'m> Elements<'m> {
             at += (s * s) as usize;
         }
         first[divisions.len()] = at as u32;
-        Ok(Elements { first, divisions: kept, facet, sides: scene.sides(), memory: needed })
+        Ok(Elements { first, divisions: kept, facet, roughness, sides: scene.sides(), memory: needed })
     }
 
     /// Number of elements.
@@ -125,6 +138,12 @@ impl<'m> Elements<'m> {
         }
     }
 
+    /// How far the blocked share of the hemisphere departs from linear functions over a facet's elements, rms.
+    #[inline(always)]
+    pub fn roughness(&self, facet: usize) -> f64 {
+        f64::from(self.roughness[facet])
+    }
+
     /// Corners of an element in scene coordinates, wound as its facet.
     pub fn corners(&self, scene: &Scene<'_>, element: usize) -> [Vec3; 3] {
         let triangle = &scene.corners()[self.facet[element] as usize];
@@ -157,13 +176,6 @@ pub fn point(triangle: &[Vec3; 3], u: f64, v: f64) -> Vec3 {
     a + (b - a) * u + (c - a) * v
 }
 
-/// A function of the form mean + g.0 * a + g.1 * b in local coordinates (a, b) has these moments
-/// (mean of f a, mean of f b); this gives g from the moments: the inverse of the triangle's Gram matrix.
-#[inline(always)]
-pub fn gradient(moments: (f64, f64)) -> (f64, f64) {
-    (24.0 * moments.0 + 12.0 * moments.1, 12.0 * moments.0 + 24.0 * moments.1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,7 +198,7 @@ mod tests {
         let scene = Scene::new(&input, &mut memory).unwrap();
         for s in [1, 2, 5, 64] {
             let mut memory = [0u8; 32768 + 4096];
-            let elements = Elements::new(&scene, &[s, 1], &mut memory).unwrap();
+            let elements = Elements::new(&scene, &[s, 1], &[], &mut memory).unwrap();
             assert_eq!(elements.count(), (s * s + 1) as usize);
             let mut area = 0.0;
             for e in 0..(s * s) as usize {

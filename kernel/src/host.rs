@@ -154,15 +154,6 @@ impl Host {
         let bvh = Bvh::build_obvhs(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
         report.bytes.bvh = bvh.memory();
         report.seconds.bvh = clock.lap();
-        let mut unevenness = std::vec![0.0; scene.facets()];
-        let probes =
-            self.split(&mut unevenness, 1, |range, out| subdivide::probe(&scene, &bvh, range, out))?;
-        report.rays.visibility += probes.iter().sum::<u64>();
-        let mut divisions = std::vec![1u32; scene.facets()];
-        subdivide::divisions(&scene, &unevenness, settings.tolerance, &mut divisions)?;
-        *element_memory = Memory::new(Elements::bytes(&divisions)?);
-        let elements = Elements::new(&scene, &divisions, element_memory.bytes_mut())?;
-        report.elements = elements.count();
         let rows = RowSettings::new(
             &scene,
             settings.tolerance,
@@ -170,6 +161,16 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
+        let mut unevenness = std::vec![0.0; scene.facets()];
+        let probes = self.split(&mut unevenness, 1, |range, out| {
+            subdivide::probe(&scene, &bvh, policy::probing(&rows), range, out)
+        })?;
+        report.rays.visibility += probes.iter().sum::<u64>();
+        let mut divisions = std::vec![1u32; scene.facets()];
+        subdivide::divisions(&scene, &unevenness, settings.tolerance, &mut divisions)?;
+        *element_memory = Memory::new(Elements::bytes(&divisions)?);
+        let elements = Elements::new(&scene, &divisions, &unevenness, element_memory.bytes_mut())?;
+        report.elements = elements.count();
         let unmerged = policy::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
             fill(&scene, &bvh, &elements, &rows, range, memory)
@@ -241,7 +242,7 @@ impl Host {
         let mut lit_share = std::vec![0.0; unknowns];
         if let Some(sun) = &light.sun {
             let rays = self.split(&mut lit_share, 1, |range, out| {
-                light::sun_rows(scene, &geometry.bvh, elements, sun, range, out)
+                light::sun_rows(scene, &geometry.bvh, elements, &coupling, sun, range, out)
             })?;
             report.rays.sun += rays.iter().sum::<u64>();
             report.rays.sun += self.beams(geometry, sun, shape, &mut direct)?;
@@ -285,9 +286,9 @@ impl Host {
             beam::fill(scene, &geometry.bvh, &geometry.elements, sun, &settings, range, memory)
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
-        let coupling = Coupling::new(&blocks, rows)?;
-        beam::add(&coupling, sun, shape, table);
-        Ok(coupling.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
+        let beams = Coupling::new(&blocks, rows)?;
+        beam::add(&beams, &geometry.coupling()?, sun, shape, table);
+        Ok(beams.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
     }
 
     /// Solves for the diffuse radiance; returns the irradiance table and the radiances.
@@ -511,6 +512,7 @@ impl Lit<'_> {
     /// radiance is emission + rho_d irradiance/pi. Degenerate facets: zeros.
     pub fn facets(&self, mut each: impl FnMut(usize, usize, f64, &[f64], &[f64])) {
         let (scene, elements) = (&self.geometry.scene, &self.geometry.elements);
+        let Ok(coupling) = self.geometry.coupling() else { return };
         let (bands, last) = (self.shape.bands, self.shape.levels - 1);
         let level = self.geometry.settings.max_bounces.map_or(last, |most| last.min(most as usize));
         let (mut irradiance, mut radiance) = (std::vec![0.0; bands], std::vec![0.0; bands]);
@@ -519,9 +521,11 @@ impl Lit<'_> {
                 irradiance.fill(0.0);
                 for unknown in elements.unknowns_of(facet, side) {
                     let mean = &self.irradiance[self.shape.at(unknown, level)][..bands];
+                    // what lies inside a body receives nothing
+                    let share = elements.share(facet) * f64::from(coupling.row(unknown).exposed);
                     for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
                         let sun = self.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
-                        *e += (m + self.sun[unknown] * sun) * elements.share(facet);
+                        *e += (m + self.sun[unknown] * sun) * share;
                     }
                 }
                 let material = scene.material(facet);

@@ -4,11 +4,11 @@
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
 
 use crate::bvh::Bvh;
-use crate::coupling::{ABSENT, BLOCKED, Coupling, RowView};
+use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
-use crate::math::{PI, Vec3};
-use crate::mirror::{Surface, opens_to_sky};
+use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
+use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sky::Sky;
@@ -42,6 +42,24 @@ impl Light<'_> {
         for (band, o) in out.iter_mut().enumerate().filter(|(_, o)| **o == 0.0) {
             *o = scene.largest_emission(band);
         }
+    }
+
+    /// Root mean square of the sky's radiance over all directions in each band, from 4,096 of them: to some percent
+    /// but where a bright spot fills less than a thousandth of the sphere.
+    pub fn rms_radiance(&self, out: &mut [f64]) {
+        out.fill(0.0);
+        let Some(sky) = &self.sky else { return };
+        let (points, sequence) = (4096, Sequence::new(0x5e1f_0000));
+        let mut radiance = [0.0; MAX_BANDS];
+        let radiance = &mut radiance[..out.len().min(MAX_BANDS)];
+        for index in 0..points {
+            let (u, v) = sequence.pair(index, 0);
+            let (z, (sin, cos)) = (2.0 * u - 1.0, (sin(TAU * v), cos(TAU * v)));
+            let r = sqrt(1.0 - z * z);
+            sky.radiance(Vec3::new(r * cos, r * sin, z), radiance);
+            out.iter_mut().zip(radiance.iter()).for_each(|(o, l)| *o += l * l);
+        }
+        out.iter_mut().for_each(|o| *o = sqrt(*o / f64::from(points)));
     }
 
     /// The largest radiance that a ray can bring straight from the sky in each band; the sun's disc apart.
@@ -87,8 +105,8 @@ impl Shape {
 /// Irradiance by the sky on the sides of the elements in `range`, straight and by way of mirrors, written to
 /// `out` (the part of the table that belongs to the range).
 ///
-/// The unobstructed irradiance of the facet's plane, less what is blocked, plus what mirrors bring: facets that
-/// nothing blocks get it to `relative_error`, and in a uniform sky the sum over targets and sky is exact.
+/// The unobstructed irradiance of the facet's plane, less what is blocked, plus what mirrors bring (where most is
+/// blocked, the sum over what is open): facets that nothing blocks get it to `relative_error`, and in a uniform sky the sum over targets and sky is exact.
 ///
 /// # Errors
 /// [`Error::Length`] for a table of the wrong size; [`Error::Mismatch`] where the sky is not uniform and the
@@ -128,7 +146,9 @@ pub fn sky_rows(
             of = Some((facet, side));
         }
         for (level, part) in values.chunks_exact_mut(3 * bands).enumerate() {
-            part[..bands].copy_from_slice(&unobstructed[..bands]);
+            if row.row.state != ENCLOSED {
+                part[..bands].copy_from_slice(&unobstructed[..bands]);
+            }
             add_escapes(&row, sky, shape, level, part);
             part[..bands].iter_mut().for_each(|e| *e = e.max(0.0));
         }
@@ -136,7 +156,7 @@ pub fn sky_rows(
     Ok(())
 }
 
-/// Takes off what is blocked and adds what escapes by way of mirrors.
+/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors.
 fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, part: &mut [f64]) {
     let bands = shape.bands;
     let mut radiance = [0.0; MAX_BANDS];
@@ -171,11 +191,12 @@ fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, par
 const SUN_POINTS: (u32, u32) = (16, 128);
 
 /// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
-/// straight. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
+/// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
 pub fn sun_rows(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,
     elements: &Elements<'_>,
+    coupling: &Coupling<'_>,
     sun: &Sun<'_>,
     range: Range<usize>,
     out: &mut [f64],
@@ -184,15 +205,15 @@ pub fn sun_rows(
         return Err(Error::Length { what: "sun table", expected: range.len(), given: out.len() });
     }
     let mut rays = 0;
-    for (unknown, value) in range.zip(out) {
+    for ((unknown, row), value) in coupling.rows(range).zip(out) {
         let (facet, side) = elements.facet_of(unknown);
         let normal = scene.side_normal(facet, side);
         let cosine = sun.cosine(normal);
         *value = 0.0;
-        if scene.areas()[facet] == 0.0 || cosine <= 0.0 {
+        if row.row.state == ABSENT || cosine <= 0.0 {
             continue;
         }
-        if opens_to_sky(scene, bvh, facet, normal) {
+        if row.row.state == OPEN {
             *value = cosine;
             continue;
         }
@@ -216,7 +237,8 @@ pub fn sun_rows(
             }
         }
         rays += u64::from(count);
-        *value = if all > 0.0 { cosine * (lit / all) } else { 0.0 };
+        let share = if all > 0.0 { lit / all } else { 0.0 };
+        *value = cosine * (share / f64::from(row.row.exposed)).min(1.0);
     }
     Ok(rays)
 }

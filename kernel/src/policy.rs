@@ -33,6 +33,11 @@ pub fn unmerged(rows: &RowSettings) -> usize {
     4 * rows.rays as usize
 }
 
+/// Probing rays of a bin: all bins together have half as many as a row of the coupling.
+pub fn probing(rows: &RowSettings) -> u32 {
+    (rows.rays / 32).clamp(4, crate::subdivide::MOST_RAYS)
+}
+
 /// Relative error of the sky's irradiance on a plane.
 pub fn sky_accuracy(tolerance: f64) -> f64 {
     (0.05 * tolerance).max(1e-9)
@@ -164,13 +169,13 @@ pub fn brightest(scene: &Scene<'_>, light: &Light<'_>, reference: &[f64], radian
     relative(largest, reference)
 }
 
-/// What a ray of a row finds where it is not blocked, or where it is: the largest radiance of the sky or the root
-/// mean square of the diffuse radiance over the object's area, relative to the reference.
+/// What a ray of a row finds where it is not blocked, or where it is: the root mean square of the sky's radiance
+/// or of the diffuse radiance over the object's area, relative to the reference.
 pub fn at_stake(system: &System<'_>, reference: &[f64], radiance: &[f64]) -> f64 {
     let bands = reference.len().clamp(1, MAX_BANDS);
     let (mut all, mut squares, mut area) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS], 0.0);
     let (sky, _) = all.split_at_mut(bands);
-    system.light.largest_radiance(sky);
+    system.light.rms_radiance(sky);
     for (unknown, values) in radiance.chunks_exact(bands).enumerate() {
         let facet = system.elements.facet_of(unknown).0;
         let own = system.scene.areas().get(facet).copied().unwrap_or(0.0) * system.elements.share(facet);

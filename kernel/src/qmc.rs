@@ -1,7 +1,7 @@
 //! Deterministic low-discrepancy points: Sobol's sequence with a nested uniform (Owen) scramble.
 //!
 //! This work is based on: Sobol' 1967, Joe and Kuo 2008 (direction numbers), Owen 1995 (scrambling), Laine and
-//! Karras 2011 and Burley 2020 (scrambling by hash). The error of a mean over n = 2^k points is O(n^-3/2) for
+//! Karras 2011, Burley 2020 and Vegdahl 2021 (scrambling by hash). The error of a mean over n = 2^k points is O(n^-3/2) for
 //! smooth integrands and about n^-3/4 where the integrand jumps.
 
 /// Dimensions that one point has.
@@ -100,11 +100,11 @@ pub const fn hash2(a: u32, b: u32) -> u32 {
 #[inline(always)]
 const fn scramble(x: u32, seed: u32) -> u32 {
     let mut x = x.reverse_bits();
+    x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
-    x ^= x.wrapping_mul(0x6c50_b47c);
-    x ^= x.wrapping_mul(0xb82f_1e52);
-    x ^= x.wrapping_mul(0xc7af_e638);
-    x ^= x.wrapping_mul(0x8d22_f6e6);
+    x = x.wrapping_mul((seed >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
     x.reverse_bits()
 }
 

@@ -3,11 +3,11 @@
 //! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
 //! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep.
 
-use crate::coupling::{BLOCKED, Coupling};
+use crate::coupling::Coupling;
 use crate::element::Elements;
 use crate::error::Error;
 use crate::light::{Light, Shape};
-use crate::math::{FRAC_1_PI, PI, fabs};
+use crate::math::{FRAC_1_PI, PI, fabs, sqrt};
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
 
@@ -107,8 +107,9 @@ impl System<'_> {
         for ((unknown, row), values) in self.coupling.rows(range).zip(out.chunks_exact_mut(stride)) {
             let values = &mut values[part.clone()];
             values.copy_from_slice(&self.direct[self.shape.at(unknown, level)]);
-            let blocked: f64 = row.escapes.iter().filter(|r| r.word() == BLOCKED).map(|r| r.weight).sum();
-            let mut square = sky.map(|l| (PI * l) * (PI * l) * blocked);
+            let blocked = row.blocked();
+            let share = if blocked > 0.5 { 1.0 - blocked } else { blocked };
+            let mut square = sky.map(|l| (PI * l) * (PI * l) * share);
             for record in row.targets {
                 let depth = row.depth(record);
                 if !self.shape.counts(depth, level) {
@@ -151,15 +152,18 @@ impl System<'_> {
 
 /// Scales gradients down by the part of their square that noise explains (James and Stein's estimate): the
 /// mean square of a linear function with these gradients over the element is `signal`; independent rays would
-/// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net about a quarter of that.
+/// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net sqrt(n) times less, and
+/// half of that serves best: gradients left out cost as much as noise let in.
 fn damp(values: &mut [f64], square: &[f64], rays: u32, bands: usize) {
     if rays == 0 {
         return;
     }
+    let n = f64::from(rays);
+    let share = 1.0 / (n * sqrt(n));
     for (band, &square) in square.iter().enumerate().take(bands) {
         let (a, b) = (values[bands + band], values[2 * bands + band]);
         let signal = (a * a + b * b - a * b) / 18.0;
-        let noise = 0.5 * square / f64::from(rays);
+        let noise = share * square;
         let keep = if signal > noise { 1.0 - noise / signal } else { 0.0 };
         values[bands + band] = a * keep;
         values[2 * bands + band] = b * keep;

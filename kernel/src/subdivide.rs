@@ -1,7 +1,7 @@
-//! How finely each facet is cut: where the share of the hemisphere that is blocked changes over the facet in a
-//! way that no linear function follows, such as where another facet pierces it or stands on it.
+//! How finely each facet is cut: where the share of the hemisphere that is dark (blocked by facets that do
+//! not shine) changes over the facet in a way that no linear function follows, such as where another facet pierces it or stands on it.
 //!
-//! Geometry, materials and tolerance decide, never the light.
+//! Geometry, materials and tolerance decide, never sky and sun.
 
 use crate::bvh::Bvh;
 use crate::element::MAX_DIVISIONS;
@@ -9,6 +9,7 @@ use crate::error::Error;
 use crate::math::{Vec3, frame};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::ray::Ray;
 use crate::scene::Scene;
 use core::ops::Range;
 
@@ -16,16 +17,30 @@ use core::ops::Range;
 const EDGE: usize = 4;
 /// Bins of a facet.
 const BINS: usize = EDGE * EDGE;
-/// Probing rays of a bin.
-const RAYS: u32 = 16;
+/// The most probing rays of a bin.
+pub const MOST_RAYS: u32 = 256;
+/// The variance counts from so many times the rays' noise on: half of the even facets pass the first, to be probed
+/// further, and one in a thousand the second.
+const SUSPECT: f64 = 1.0;
+const CERTAIN: f64 = 3.0;
 
 /// Probes each facet of `range`: how far the blocked share of the hemisphere departs from a linear function of
 /// the position, as a variance less what the rays' noise explains; 0 where that is all. Returns the rays traced.
-pub fn probe(scene: &Scene<'_>, bvh: &Bvh<'_>, range: Range<usize>, out: &mut [f64]) -> Result<u64, Error> {
+///
+/// Each side is probed from 16 bins with `rays` rays each (1 to [`MOST_RAYS`]; as many as a row of the coupling has
+/// serve the same error), a quarter of that where they show nothing.
+pub fn probe(
+    scene: &Scene<'_>,
+    bvh: &Bvh<'_>,
+    rays: u32,
+    range: Range<usize>,
+    out: &mut [f64],
+) -> Result<u64, Error> {
     if out.len() != range.len() {
         return Err(Error::Length { what: "unevenness", expected: range.len(), given: out.len() });
     }
-    let mut rays = 0;
+    let shining = (0..scene.bands()).any(|band| scene.largest_emission(band) > 0.0);
+    let mut probe = Probe { scene, bvh, rays: rays.clamp(1, MOST_RAYS), shining, traced: 0 };
     for (facet, value) in range.zip(out) {
         *value = 0.0;
         let dark = scene.diffuse(scene.material(facet)).iter().all(|&d| d == 0.0);
@@ -36,36 +51,57 @@ pub fn probe(scene: &Scene<'_>, bvh: &Bvh<'_>, range: Range<usize>, out: &mut [f
             if opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
                 continue;
             }
-            let blocked = probe_side(scene, bvh, facet, side, &mut rays);
-            *value = f64::max(*value, unevenness(&blocked));
+            *value = f64::max(*value, probe.side(facet, side));
         }
     }
-    Ok(rays)
+    Ok(probe.traced)
 }
 
-/// Share of the hemisphere that is blocked in each bin of one side of a facet.
-fn probe_side(scene: &Scene<'_>, bvh: &Bvh<'_>, facet: usize, side: usize, rays: &mut u64) -> [f64; BINS] {
-    let mut blocked = [0.0; BINS];
-    let (x, y) = frame(scene.side_normal(facet, side));
-    let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000));
-    // all bins in turn, so that an open facet is known after a quarter of the rays
-    for index in 0..RAYS {
-        for (bin, count) in blocked.iter_mut().enumerate() {
-            let at = index * BINS as u32 + bin as u32;
-            let (p, q) = sequence.pair(at, 2);
-            let (u, v) = in_bin(bin, triangle(p, q));
-            let origin = Surface::new(scene, facet, side, u, v);
-            let (p, q) = sequence.pair(at, 0);
-            let (dx, dy, dz) = cosine_direction(p, q);
-            let direction: Vec3 = x * dx + y * dy + origin.normal * dz;
-            *count += if bvh.occluded(&origin.leave(direction)) { 1.0 / f64::from(RAYS) } else { 0.0 };
+struct Probe<'a> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    rays: u32,
+    /// Whether some facets shine by themselves.
+    shining: bool,
+    traced: u64,
+}
+
+impl Probe<'_> {
+    /// Whether a ray brings neither light from outside nor from a facet that shines by itself.
+    #[inline]
+    fn dark(&self, ray: &Ray) -> bool {
+        if !self.shining {
+            return self.bvh.occluded(ray);
         }
-        *rays += BINS as u64;
-        if index + 1 == RAYS / 4 && blocked.iter().all(|&b| b == 0.0) {
-            break;
-        }
+        let Some(hit) = self.bvh.closest(ray) else { return false };
+        let surface = Surface::of_hit(self.scene, &hit);
+        surface.is_none_or(|s| self.scene.emission(s.material).iter().all(|&l| l == 0.0))
     }
-    blocked
+
+    /// Unevenness of the share of the hemisphere that is dark over one side of a facet.
+    fn side(&mut self, facet: usize, side: usize) -> f64 {
+        let mut blocked = [0u32; BINS];
+        let (x, y) = frame(self.scene.side_normal(facet, side));
+        let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000));
+        // all bins in turn, so that an open or even facet is known after a quarter of the rays
+        for index in 0..self.rays {
+            for (bin, count) in blocked.iter_mut().enumerate() {
+                let at = index * BINS as u32 + bin as u32;
+                let (p, q) = sequence.pair(at, 2);
+                let (u, v) = in_bin(bin, triangle(p, q));
+                let origin = Surface::new(self.scene, facet, side, u, v);
+                let (p, q) = sequence.pair(at, 0);
+                let (dx, dy, dz) = cosine_direction(p, q);
+                let direction: Vec3 = x * dx + y * dy + origin.normal * dz;
+                *count += u32::from(self.dark(&origin.leave(direction)));
+            }
+            self.traced += BINS as u64;
+            if index + 1 == self.rays / 4 && unevenness(&blocked, self.rays / 4, SUSPECT) == 0.0 {
+                return 0.0;
+            }
+        }
+        unevenness(&blocked, self.rays, CERTAIN)
+    }
 }
 
 /// Barycentric weights in the facet of a point of a bin: bins are the triangles of an edge cut in [`EDGE`].
@@ -83,16 +119,17 @@ fn in_bin(bin: usize, (a, b): (f64, f64)) -> (f64, f64) {
     }
 }
 
-/// Variance of the bins about their best linear function, less what the rays' noise brings; 0 where it is not
-/// three times that.
-fn unevenness(blocked: &[f64; BINS]) -> f64 {
+/// Variance of the bins' blocked shares (each counted over so many `rays`) about their best linear function, less
+/// what the rays' noise brings; 0 where it is not `least` times that.
+fn unevenness(blocked: &[u32; BINS], rays: u32, least: f64) -> f64 {
     let n = BINS as f64;
-    let mean = blocked.iter().sum::<f64>() / n;
+    let share = |count: u32| f64::from(count) / f64::from(rays);
+    let mean = share(blocked.iter().sum::<u32>()) / n;
     // moments about the centroid, in barycentric coordinates
     let (mut xx, mut xy, mut yy, mut xb, mut yb, mut bb) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    for (bin, value) in blocked.iter().enumerate() {
+    for (bin, &count) in blocked.iter().enumerate() {
         let (x, y) = in_bin(bin, (1.0 / 3.0, 1.0 / 3.0));
-        let (x, y, b) = (x - 1.0 / 3.0, y - 1.0 / 3.0, value - mean);
+        let (x, y, b) = (x - 1.0 / 3.0, y - 1.0 / 3.0, share(count) - mean);
         xx += x * x;
         xy += x * y;
         yy += y * y;
@@ -103,17 +140,19 @@ fn unevenness(blocked: &[f64; BINS]) -> f64 {
     let determinant = xx * yy - xy * xy;
     let explained = (yy * xb * xb - 2.0 * xy * xb * yb + xx * yb * yb) / determinant;
     let residual = (bb - explained).max(0.0) / (n - 3.0);
-    let noise = mean * (1.0 - mean) / f64::from(RAYS);
-    let excess = residual - noise;
-    if residual > 3.0 * noise { excess } else { 0.0 }
+    let noise = mean * (1.0 - mean) / f64::from(rays);
+    if residual > least * noise { residual - noise } else { 0.0 }
 }
+
+/// Elements that a mesh of any facets may have beyond that, at a tolerance of 2e-3.
+const COARSE: f64 = 2048.0;
 
 /// Divisions of each facet's edges from its unevenness.
 ///
 /// A jump leaves an error in the elements that it crosses, a share 1/S of them: the facet's part of the image's
 /// mean square error is a V rho^2/S with its share `a` of the area. The least number of elements for a given
 /// sum over all facets has S ~ (a V rho^2)^(1/3). The sum is (tolerance/2)^2, or what 1 + 2e-3/tolerance
-/// times as many elements as there are facets (and a thousand, for coarse meshes) reach.
+/// times as many elements as there are facets, and some more for coarse meshes, reach.
 pub fn divisions(
     scene: &Scene<'_>,
     unevenness: &[f64],
@@ -132,7 +171,7 @@ pub fn divisions(
     };
     let goal = 0.25 * tolerance * tolerance;
     let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;
-    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + 1024.0 * (2e-3 / tolerance).min(1.0);
+    let most = scene.facets() as f64 * (1.0 + 2e-3 / tolerance) + COARSE * (2e-3 / tolerance).min(4.0);
     loop {
         let mut elements = 0.0;
         for (facet, s) in out.iter_mut().enumerate() {
@@ -153,12 +192,12 @@ mod tests {
     #[test]
     fn a_jump_is_uneven_and_a_slope_is_not() {
         let of = |f: fn(f64, f64) -> f64| {
-            let mut bins = [0.0; BINS];
+            let mut bins = [0; BINS];
             for (bin, b) in bins.iter_mut().enumerate() {
                 let (x, y) = in_bin(bin, (1.0 / 3.0, 1.0 / 3.0));
-                *b = f(x, y);
+                *b = (1000.0 * f(x, y)) as u32;
             }
-            unevenness(&bins)
+            unevenness(&bins, 1000, CERTAIN)
         };
         assert_eq!(of(|x, y| 0.2 + 0.3 * x + 0.4 * y), 0.0);
         assert_eq!(of(|_, _| 1.0), 0.0);

@@ -188,16 +188,16 @@ pub fn run(
     let build = if plan.obvhs { Bvh::build_obvhs } else { Bvh::build };
     let bvh = build(scene.corners(), scene.areas(), plan.isa, &mut work.bvh[..bytes])?;
 
+    let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
+    let probing = policy::probing(&settings);
     split(parts, scene.facets(), 1, &mut work.unevenness, |range, out| {
-        counts.visibility += subdivide::probe(&scene, &bvh, range, out)?;
+        counts.visibility += subdivide::probe(&scene, &bvh, probing, range, out)?;
         Ok(())
     })?;
     subdivide::divisions(&scene, &work.unevenness, plan.tolerance, &mut work.divisions)?;
     let bytes = Elements::bytes(&work.divisions)?;
-    let elements = Elements::new(&scene, &work.divisions, &mut work.elements[..bytes])?;
+    let elements = Elements::new(&scene, &work.divisions, &work.unevenness, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
-
-    let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
     let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
         rows::fill(&scene, &bvh, &elements, &settings, range, memory)
     })?;
@@ -259,7 +259,7 @@ impl Stage<'_> {
         lit.fill(0.0);
         let Some(sun) = &self.light.sun else { return Ok(()) };
         split(parts, counts.unknowns, 1, lit, |range, out| {
-            counts.sun += light::sun_rows(scene, bvh, elements, sun, range, out)?;
+            counts.sun += light::sun_rows(scene, bvh, elements, self.coupling, sun, range, out)?;
             Ok(())
         })?;
         let settings =
@@ -269,7 +269,7 @@ impl Stage<'_> {
             beam::fill(scene, bvh, elements, sun, &settings, range, memory)
         })?;
         let thrown = Coupling::new(&blocks[..parts], mirrors)?;
-        beam::add(&thrown, sun, self.shape, direct);
+        beam::add(&thrown, self.coupling, sun, self.shape, direct);
         counts.beams =
             thrown.rows(0..mirrors).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum();
         Ok(())

@@ -16,6 +16,8 @@ pub struct Outcome {
     pub reference: Vec<f64>,
     /// Irradiance, (facet, side, band).
     pub irradiance: Vec<f64>,
+    /// Share of each facet's area that its elements have.
+    pub shares: Vec<f64>,
     /// The report.
     pub report: Report,
     /// From mesh to image.
@@ -63,6 +65,7 @@ pub fn run(case: &Case, tolerance: f64) -> Result<Outcome, Error> {
         pixels: image.pixels.iter().map(|&p| f64::from(p)).collect(),
         reference: lit.reference().to_vec(),
         irradiance: kernel::irradiances(&lit),
+        shares: (0..case.mesh.facets.len()).map(|f| geometry.elements().share(f)).collect(),
         report: image.report,
         seconds,
     })

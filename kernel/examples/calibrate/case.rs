@@ -147,38 +147,55 @@ impl Case {
 }
 
 fn camera(draw: &mut Draw, setting: &Setting) -> CameraInput {
-    let points = || setting.mesh.vertices.iter().map(|v| DVec3::from(*v));
-    let low = points().fold(DVec3::INFINITY, DVec3::min);
-    let high = points().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let (middle, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
-    let perspective = draw.chance(0.5) || matches!(setting.eye, Eye::Within(_));
-    let side = draw.whole(20, 32);
+    let side = draw.whole(22, 36);
     let (columns, rows) = (side + draw.whole(0, 8), side);
     let sampling = draw.pick(&[Sampling::Area, Sampling::Centre]);
-    let fov_deg =
-        if matches!(setting.eye, Eye::Within(_)) { draw.real(50.0, 95.0) } else { draw.real(15.0, 50.0) };
+    let perspective = draw.chance(0.5) || matches!(setting.eye, Eye::Within(_));
     let direction = match setting.eye {
         Eye::Outside => draw.direction(10.0, 70.0),
         Eye::Around => draw.direction(-50.0, 70.0),
         Eye::Above => draw.direction(40.0, 85.0),
         Eye::Octant => draw.point(0.3, 1.0).normalize(),
-        Eye::Within(_) => DVec3::Z,
-    };
-    let (eye, target) = match setting.eye {
         Eye::Within(size) => {
+            // from one wall to the opposite one
             let inside = dvec3(0.42, 0.42, 0.85) * size;
-            let at = dvec3(-inside.x, draw.real(-inside.y, inside.y), draw.real(0.5, 1.0) * inside.z);
-            (at, dvec3(inside.x, draw.real(-inside.y, inside.y), draw.real(0.0, 0.6) * inside.z))
-        }
-        _ => {
-            let target = middle + draw.point(-0.15, 0.15) * radius;
-            let away = draw.real(0.9, 1.2) * radius / (fov_deg.to_radians() / 2.0).sin();
-            (target + direction * if perspective { away } else { 4.0 * radius }, target)
+            let eye = dvec3(-inside.x, draw.real(-inside.y, inside.y), draw.real(0.5, 1.0) * inside.z);
+            let target = dvec3(inside.x, draw.real(-inside.y, inside.y), draw.real(0.0, 0.6) * inside.z);
+            let projection = Projection::Perspective { fov_deg: draw.real(50.0, 95.0) };
+            return view(projection, eye, target, [columns, rows], sampling);
         }
     };
-    let height = draw.real(1.1, 1.8) * radius;
-    let projection =
-        if perspective { Projection::Perspective { fov_deg } } else { Projection::Orthographic { height } };
-    let target = target.to_array();
-    CameraInput { projection, eye: eye.to_array(), target, up: [0.0, 0.0, 1.0], columns, rows, sampling }
+    let points = || setting.mesh.vertices.iter().map(|v| DVec3::from(*v));
+    let low = points().fold(DVec3::INFINITY, DVec3::min);
+    let high = points().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let (middle, radius) = ((low + high) / 2.0, (high - low).length() / 2.0);
+    let away = radius * draw.real(1.6, 5.0);
+    let right = DVec3::Z.cross(direction).normalize();
+    let up = direction.cross(right);
+    // half the image's height that shows the whole scene, at the scene or at distance 1
+    let half = points()
+        .map(|p| p - middle)
+        .map(|p| {
+            let size = (p.dot(right).abs() * rows as f64 / columns as f64).max(p.dot(up).abs());
+            if perspective { size / (away - p.dot(direction)) } else { size }
+        })
+        .fold(0.0, f64::max);
+    let half = half * draw.real(0.7, 1.05);
+    let projection = if perspective {
+        Projection::Perspective { fov_deg: 2.0 * half.atan().to_degrees() }
+    } else {
+        Projection::Orthographic { height: 2.0 * half }
+    };
+    view(projection, middle + direction * away, middle, [columns, rows], sampling)
+}
+
+fn view(
+    projection: Projection,
+    eye: DVec3,
+    target: DVec3,
+    [columns, rows]: [usize; 2],
+    sampling: Sampling,
+) -> CameraInput {
+    let (eye, target) = (eye.to_array(), target.to_array());
+    CameraInput { projection, eye, target, up: [0.0, 0.0, 1.0], columns, rows, sampling }
 }

@@ -11,6 +11,8 @@ pub struct Row {
     pub family: &'static str,
     /// Light, sides, bands, view.
     pub summary: String,
+    /// Kinds of pixels with their shares of eps^2 and of the pixels, if asked for.
+    pub causes: Vec<(String, f64, f64)>,
     /// Facets.
     pub facets: usize,
     /// Pixels on the object.
@@ -111,7 +113,7 @@ pub fn figures(name: &str, rows: &[&Row]) -> String {
         |q: f64| ratios.get((q * ratios.len() as f64) as usize).or(ratios.last()).copied().unwrap_or(0.0);
     let seconds: f64 = rows.iter().map(|r| r.seconds[0]).sum();
     format!(
-        "{name:18} {:4} {:7.1} {:7.1} {:7.1}   {:6.2} {:6.2} {:8.2}   {unsure:3}  {seconds:7.1}",
+        "{name:24} {:4} {:7.1} {:7.1} {:7.1}   {:6.2} {:6.2} {:8.2}   {unsure:3}  {seconds:7.1}",
         rows.len(),
         share(|v| v.covered),
         share(|v| v.tight),
@@ -123,5 +125,5 @@ pub fn figures(name: &str, rows: &[&Row]) -> String {
 }
 
 /// What the columns of [`figures`] are.
-pub const FIGURES_HEAD: &str = "                   cases covered%  tight%    met%   eps/tolerance: median, 95%, worst   \
+pub const FIGURES_HEAD: &str = "                         cases covered%  tight%    met%   eps/tolerance: median, 95%, worst   \
     unsure  seconds";

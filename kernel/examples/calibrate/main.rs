@@ -12,6 +12,9 @@
 //! * `--mrays N`: millions of rays after which a reference is good enough, by default 20
 //! * `--tolerance X`: another tolerance for Blik in all cases (references stay as they are)
 //! * `--dump FOLDER`: images of Blik and both halves as .npy
+//! * `--twin N`: N pixels of each case by the readable twin, too (slow; where pixels are single rays)
+//! * `--causes`: sorts each case's error by what is difficult about its pixels, and the failed cases by their largest
+//!   part
 //! * `--list`: names the cases and ends
 
 #[path = "../../../tests/support/judge/mod.rs"]
@@ -23,6 +26,7 @@ mod support;
 
 mod blik;
 mod case;
+mod causes;
 mod draw;
 mod families;
 mod figures;
@@ -30,6 +34,7 @@ mod light;
 mod options;
 mod reference;
 mod shapes;
+mod verify;
 
 use case::{CASES, Case};
 use figures::{FIGURES_HEAD, Row, figures};
@@ -78,6 +83,14 @@ fn calibrate(options: &Options) -> Result<(), String> {
             Ok(row) => {
                 writeln!(table, "{}", row.csv()).map_err(broken)?;
                 eprintln!("{:6.1} s  {}", start.elapsed().as_secs_f64(), row.csv());
+                row.causes.iter().take(4).for_each(|(name, part, pixels)| {
+                    eprintln!(
+                        "{:12}{:3.0} % of eps^2 on {:3.0} % of the pixels: {name}",
+                        "",
+                        100.0 * part,
+                        100.0 * pixels
+                    );
+                });
                 rows.push(row);
             }
             Err(error) => {
@@ -97,6 +110,11 @@ fn calibrate(options: &Options) -> Result<(), String> {
 /// A case's row; the inner error is Blik's.
 fn measure(case: &Case, options: &Options) -> Result<Result<Row, blik_kernel::Error>, String> {
     let reference = reference::of(case, options.goal, &options.references).map_err(|e| e.to_string())?;
+    if options.twin > 0
+        && let Some((difference, noise)) = verify::against_twin(case, &reference, options.twin)
+    {
+        eprintln!("case {}: judge and twin differ by {difference:.1e}, noise {noise:.1e}", case.index);
+    }
     let tolerance = options.tolerance.unwrap_or(case.tolerance);
     let outcome = match blik::run(case, tolerance) {
         Ok(outcome) => outcome,
@@ -118,6 +136,7 @@ fn measure(case: &Case, options: &Options) -> Result<Result<Row, blik_kernel::Er
     let per_pi: Vec<f64> = outcome.reference.iter().map(|r| std::f64::consts::PI * r).collect();
     let halves = [0, 1].map(|h| &reference.irradiance[h][..]);
     let irradiance = score(&received, halves, &vec![true; reference.sides.len()], &per_pi);
+    let causes = if options.causes { causes::of(case, &reference, &outcome) } else { Vec::new() };
     if let Some(folder) = &options.dump {
         dump(case, &outcome.pixels, &reference, folder).map_err(|e| e.to_string())?;
     }
@@ -126,6 +145,7 @@ fn measure(case: &Case, options: &Options) -> Result<Result<Row, blik_kernel::Er
         case: case.index,
         family: case.family,
         summary: case.summary(),
+        causes,
         facets: case.mesh.facets.len(),
         pixels: reference.image.hit.iter().filter(|&&h| h).count(),
         tolerance,
@@ -180,6 +200,17 @@ fn summarise(rows: &[Row]) {
     }
     let mut worst: Vec<&Row> = rows.iter().filter(|r| r.badness() > 1.0).collect();
     worst.sort_by(|a, b| b.badness().total_cmp(&a.badness()));
+    if rows.iter().any(|r| !r.causes.is_empty()) {
+        println!("cases that miss their tolerance, by the kind of pixels that carries most of the error");
+        let missed = || rows.iter().filter(|r| !r.verdict().met);
+        let mut names: Vec<&str> = missed().filter_map(|r| r.causes.first()).map(|c| c.0.as_str()).collect();
+        names.sort_unstable();
+        for group in names.chunk_by(|a, b| a == b) {
+            let of: Vec<&Row> =
+                missed().filter(|r| r.causes.first().is_some_and(|c| c.0 == group[0])).collect();
+            println!("{}", figures(group[0], &of));
+        }
+    }
     println!("worst: true error beyond tolerance or estimate");
     for row in worst.iter().take(40) {
         println!(

@@ -20,6 +20,10 @@ pub struct Options {
     pub tolerance: Option<f64>,
     /// Where images go.
     pub dump: Option<PathBuf>,
+    /// Pixels of each case that the twin computes, too.
+    pub twin: usize,
+    /// Sort each case's error by what is difficult about its pixels.
+    pub causes: bool,
     /// Only name the cases.
     pub list: bool,
 }
@@ -37,6 +41,8 @@ impl Options {
             goal: Goal { error: 0.15, rays: 20_000_000 },
             tolerance: None,
             dump: None,
+            twin: 0,
+            causes: false,
             list: false,
         };
         options.read().map_err(|e| e.to_string())?;
@@ -55,6 +61,8 @@ impl Options {
                 Long("mrays") => self.goal.rays = 1_000_000 * parser.value()?.parse::<u64>()?,
                 Long("tolerance") => self.tolerance = Some(parser.value()?.parse()?),
                 Long("dump") => self.dump = Some(parser.value()?.into()),
+                Long("twin") => self.twin = parser.value()?.parse()?,
+                Long("causes") => self.causes = true,
                 Long("list") => self.list = true,
                 other => return Err(other.unexpected()),
             }
@@ -65,7 +73,7 @@ impl Options {
     /// Whether a case of this number belongs to the subset.
     pub fn takes(&self, index: usize) -> bool {
         // of kind k the cases start at another one, so that a subset has all kinds of light
-        (index / FAMILIES.len() + index % FAMILIES.len()) % self.every == 0
+        (index / FAMILIES.len() + index % FAMILIES.len()).is_multiple_of(self.every)
     }
 
     /// Whether the filter lets a case pass.

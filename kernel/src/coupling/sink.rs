@@ -3,7 +3,6 @@
 use super::word::{Word, Words};
 use super::{BLOCKED, Head, Record, Row};
 use crate::arena::{ALIGNMENT, Arena, Need};
-use crate::element::gradient;
 use crate::error::Error;
 use crate::scene::Scene;
 use core::cmp::Ordering;
@@ -97,18 +96,19 @@ impl<'m> Sink<'m> {
         self.used = self.start;
     }
 
-    /// Ends the present row: sorts and merges its records, scales them and turns moments into gradients.
-    pub fn end_row(&mut self, scale: f64, stats: Row) {
-        let row = &mut self.records[self.start..self.used];
+    /// Ends the present row with what `finish` leaves of each record: sorts and merges the records.
+    pub fn end_row(&mut self, stats: Row, finish: impl Fn(Record) -> Option<Record>) {
+        let mut kept = self.start;
+        for i in self.start..self.used {
+            if let Some(record) = finish(self.records[i]) {
+                self.records[kept] = record;
+                kept += 1;
+            }
+        }
+        let row = &mut self.records[self.start..kept];
         let words = &self.words;
         row.sort_unstable_by(|a, b| order(words, a, b));
         let kept = merge(row);
-        for record in row[..kept].iter_mut() {
-            record.weight *= scale;
-            let moments = (f64::from(record.gradient[0]) * scale, f64::from(record.gradient[1]) * scale);
-            let g = gradient(moments);
-            record.gradient = [g.0 as f32, g.1 as f32];
-        }
         let escapes = self.start + row[..kept].partition_point(|r| !r.is_escape());
         self.rows[self.done] = Row { start: self.start as u32, escapes: escapes as u32, ..stats };
         self.done += 1;

@@ -8,8 +8,10 @@
 //! other, what a point sun throws by two of them and more is left out. Of a disc it is found by rays that meet it.
 //!
 //! Apart from the twin's support modules: a test takes it with `#[path = "support/judge/mod.rs"] mod judge;`.
-#![allow(dead_code)]
+// Each binary uses a part.
+#![allow(dead_code, unused_imports)]
 
+mod cause;
 mod sampler;
 mod score;
 mod sunlight;
@@ -17,7 +19,7 @@ mod view;
 mod walk;
 
 pub use score::{Score, score};
-pub use view::Halves;
+pub use view::{Halves, ray};
 
 use crate::support::twin::{Material, Rng, Scene, Sky, Sun, cosine_direction};
 use blik_kernel::arena::Memory;
@@ -119,6 +121,11 @@ impl<'m> Judge<'m> {
         (0..self.bands)
             .map(|b| if dark { emission(b) } else { sides[0][b].max(sides[1][b]) + sun[b] })
             .collect()
+    }
+
+    /// Whether the sun is followed through mirrors of any number and order: they lie in a few planes.
+    pub fn follows_all_mirrors(&self) -> bool {
+        matches!(self.mirrors, Mirrors::Maps(_))
     }
 
     /// Mean irradiance (not divided by pi) on the sides `(facet, front)`, each from twice `samples` (at most 65,536)

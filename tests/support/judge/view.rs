@@ -7,8 +7,8 @@ use blik_kernel::ray::Ray;
 use glam::DVec3;
 use std::sync::Mutex;
 
-/// Samples of a pixel's half: the first pass, and the most that the sampler has.
-const SAMPLES: (u32, u32) = (32, 65_536);
+/// Samples of a pixel's half: the fewest, so that rare light shows in the noise, and the most that the sampler has.
+const SAMPLES: (u32, u32) = (128, 65_536);
 
 /// A reference image in two independent halves.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,6 +75,11 @@ impl Lens {
             Ray::new(self.eye, (self.forward + aside).normalize())
         }
     }
+}
+
+/// The ray through a point of a camera's image, in pixels from the upper left corner.
+pub fn ray(camera: &CameraInput, column: f64, row: f64) -> Ray {
+    Lens::new(camera).ray(column, row)
 }
 
 #[derive(Clone, Copy, Default)]
