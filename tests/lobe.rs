@@ -133,7 +133,7 @@ fn samples_integrate_the_visible_lobe() {
             for (k, f) in functions.iter().enumerate() {
                 let mut sum = 0.0;
                 for i in 0..n {
-                    let d = lobe.ray(i, n, m, Vec3::Z);
+                    let d = lobe.ray(i, n, 0.0, m, Vec3::Z);
                     assert!(d.z > 0.0 && (d.length() - 1.0).abs() < 1e-8, "{ratio} {degrees} {i}: {d}");
                     sum += f(d);
                 }
@@ -169,25 +169,26 @@ fn ray_sets() {
     // wholly above the facet at normal view: the median is the mirror direction, the ring regular
     for ratio in [3.0, 50.0] {
         let lobe = lobe(ratio);
-        assert!((lobe.ray(0, 1, Vec3::Z, Vec3::Z) - Vec3::Z).length() < 1e-15);
-        assert!((lobe.ray(0, 7, Vec3::Z, Vec3::Z) - Vec3::Z).length() < 1e-15);
+        assert!((lobe.ray(0, 1, 0.0, Vec3::Z, Vec3::Z) - Vec3::Z).length() < 1e-15);
+        assert!((lobe.ray(0, 7, 0.0, Vec3::Z, Vec3::Z) - Vec3::Z).length() < 1e-15);
         let u: f64 = 1.0 / 7.0 + 3.0 / 7.0;
         let sin2 = (ratio.powf(2.0 * u) - 1.0) / (ratio * ratio - 1.0);
         for i in 1..7 {
-            let (a, b) = (lobe.ray(i, 7, Vec3::Z, Vec3::Z), lobe.ray(i % 6 + 1, 7, Vec3::Z, Vec3::Z));
+            let (a, b) =
+                (lobe.ray(i, 7, 0.0, Vec3::Z, Vec3::Z), lobe.ray(i % 6 + 1, 7, 0.0, Vec3::Z, Vec3::Z));
             assert!((1.0 - a.z * a.z - sin2).abs() < 1e-13);
             // neighbours 60 degrees apart
             assert!((a.truncate().dot(b.truncate()) / sin2 - 0.5).abs() < 1e-12);
         }
         // symmetric about the plane of incidence
         for n in [2, 3, 5, 7] {
-            let sum: f64 = (0..n).map(|i| lobe.ray(i, n, m, Vec3::Z).y).sum();
+            let sum: f64 = (0..n).map(|i| lobe.ray(i, n, 0.0, m, Vec3::Z).y).sum();
             assert!(sum.abs() < 1e-9, "{n}: {sum}");
         }
     }
     // cut off at the horizon: half of the visible energy is above the single ray, half below it
     let (lobe, m) = (lobe(3.0), mirror(85.0));
-    let ray = lobe.ray(0, 1, m, Vec3::Z);
+    let ray = lobe.ray(0, 1, 0.0, m, Vec3::Z);
     assert!(ray.y.abs() < 1e-15 && ray.z > m.z);
     // the great circle through the ray and the y axis parts the lobe
     let side = Vec3::new(-ray.z, 0.0, ray.x);
@@ -209,7 +210,7 @@ fn no_input_gives_nan() {
             }
             assert!(lobe.albedo(m.z).is_finite() && lobe.value(m.z).is_finite());
         }
-        assert!(lobe.ray(5, 0, Vec3::Z, Vec3::Z).is_finite());
+        assert!(lobe.ray(5, 0, 0.0, Vec3::Z, Vec3::Z).is_finite());
         assert!(lobe.value(1.0 + 1e-15).is_finite());
     }
 }

@@ -327,6 +327,7 @@ fn build(
         sky: given.sky.as_ref().map(|s| Sky::new(s, scene.bands())).transpose()?,
         sun: given.sun.as_ref().map(|s| Sun::new(s, scene.bands())).transpose()?,
     };
+    policy::check_highlights(scene, &light)?;
     let reference = arena_reference(&given, &light, coupling, &mut arena)?;
     let (unknowns, shape) = (sizes.unknowns, sizes.shape);
     let sun = arena.take::<f64>(unknowns)?;
@@ -352,7 +353,7 @@ fn build(
         irradiance,
         sun,
         noise,
-        brightest: policy::brightest(&light, reference, radiance),
+        brightest: policy::brightest(scene, &light, reference, radiance),
         solver: sweeps.map_or(0.0, |s| s.error),
         sweeps: sweeps.map_or(shape.levels as u32, |s| s.done),
         sun_rays,

@@ -206,6 +206,10 @@ impl Host {
     }
 
     /// The light of a scene, solved: no visibility is computed again.
+    ///
+    /// # Errors
+    /// What [`Sky::new`] and [`Sun::new`] refuse, radiances above 1e37 ([`policy::check_radiance`],
+    /// [`policy::check_highlights`]), a system that diverges.
     pub fn light<'g>(
         &self,
         geometry: &'g Geometry<'g>,
@@ -220,6 +224,7 @@ impl Host {
             sky: sky.map(|s| Sky::new(s, bands)).transpose()?,
             sun: sun.map(|s| Sun::new(s, bands)).transpose()?,
         };
+        policy::check_highlights(scene, &light)?;
         let mut reference = std::vec![0.0; bands];
         match &geometry.settings.reference_radiance {
             Some(given) => reference.copy_from_slice(given),
@@ -258,7 +263,7 @@ impl Host {
         policy::check_radiance(&radiance, bands)?;
         let contrast = policy::at_stake(&system, &reference, &radiance);
         let noise = coupling.rows(0..unknowns).map(|(_, r)| policy::noise(&r.row, contrast)).collect();
-        let brightest = policy::brightest(&light, &reference, &radiance);
+        let brightest = policy::brightest(scene, &light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
         Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, noise, brightest, report })

@@ -115,7 +115,8 @@ impl Lobe {
     /// Ray `ray` (0..`count`) of `count` rays of equal energy, each standing for albedo/`count`, above the
     /// facet: 1: the energy's median direction (the mirror direction where nothing is cut off); 2 to 4: a
     /// ring; 5 to 9: a centre and a ring, every ray at the median of its cell's energy; more: a sunflower.
-    pub fn ray(&self, ray: usize, count: usize, mirror: Vec3, normal: Vec3) -> Vec3 {
+    /// The set is rotated about the mirror direction by `turn` turns, so that sets that count together differ.
+    pub fn ray(&self, ray: usize, count: usize, turn: f64, mirror: Vec3, normal: Vec3) -> Vec3 {
         let (i, n) = (ray as f64, count.max(1) as f64);
         let (u, v) = match (count, ray) {
             (0..=1, _) | (5..=9, 0) => (0.0, 0.0),
@@ -123,7 +124,7 @@ impl Lobe {
             (5..=9, _) => (0.5 + 0.5 / n, (i - 0.5) / (n - 1.0)),
             _ => ((i + 0.5) / n, i * GOLDEN - floor(i * GOLDEN)),
         };
-        self.sample(mirror, normal, u, v)
+        self.sample(mirror, normal, u, v + turn)
     }
 
     /// tan(alpha) of the cone that holds the share `u` < 1 of the whole lobe's energy:

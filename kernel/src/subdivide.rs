@@ -145,7 +145,7 @@ fn unevenness(blocked: &[u32; BINS], rays: u32, least: f64) -> f64 {
 }
 
 /// Elements that a mesh of any facets may have beyond that, at a tolerance of 2e-3.
-const COARSE: f64 = 2048.0;
+const COARSE: f64 = 1024.0;
 
 /// Divisions of each facet's edges from its unevenness.
 ///

@@ -312,21 +312,7 @@ impl Stage<'_> {
         split(parts, unknowns, stride, &mut tables.irradiance[..unknowns * stride], |range, out| {
             system.gather(range, 0, |_| from, out)
         })?;
-        Ok(self.brightest(from))
-    }
-
-    fn brightest(&self, radiance: &[f64]) -> f64 {
-        let bands = self.shape.bands;
-        let mut largest = [0.0; MAX_BANDS];
-        self.light.largest_radiance(&mut largest[..bands]);
-        if let Some(sun) = &self.light.sun {
-            (0..bands).for_each(|b| largest[b] += sun.disc_radiance(b));
-        }
-        for values in radiance.chunks_exact(bands) {
-            largest.iter_mut().zip(values).for_each(|(l, &v)| *l = l.max(v));
-        }
-        let relative = largest.iter().zip(self.reference).filter(|(_, r)| **r > 0.0);
-        relative.map(|(l, r)| l / r).fold(0.0, f64::max)
+        Ok(policy::brightest(self.scene, self.light, self.reference, from))
     }
 
     /// Image and signature.

@@ -92,7 +92,7 @@ const INSIDE: f64 = 0.9375;
 
 /// Weight of what elements do not resolve beside what their number of rays does not, in squares: so that some nine
 /// of ten images of the calibration's scenes err by less than estimated.
-const ROUGHNESS: f64 = 0.25;
+const ROUGHNESS: f64 = 0.06;
 
 /// The fewest rays of a row.
 const FEWEST: u32 = 64;
