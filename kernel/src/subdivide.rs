@@ -188,7 +188,7 @@ pub fn divisions(
 
 /// The most elements that [`divisions`] cuts `facets` facets into.
 pub fn most_elements(facets: usize, tolerance: f64) -> usize {
-    (facets as f64 * (1.0 + 2e-3 / tolerance) + COARSE * (2e-3 / tolerance).min(4.0)) as usize
+    (facets as f64 * (1.0 + 2e-3 / tolerance) + COARSE * (2e-3 / tolerance).min(1.0)) as usize
 }
 
 #[cfg(test)]
