@@ -215,8 +215,9 @@ fn infinite_plates_between_perfect_mirrors() {
     let scene = Scene::new(&scenes::plates_in_pipe(), &materials);
     solve(&scene, &within(2e-3), |_, lit| {
         let diffuse = 1.0 + 0.3 * mean_irradiance(lit, &[0, 1])[0] / PI;
-        // chains end at 1e-3 of the tolerance, relative to the largest emission, 1, and so does the solver
-        close("S-PLATES-J1", diffuse, cases::value("S-PLATES-J1"), 1e-5);
+        // chains end at 1e-3 of the tolerance, relative to the largest emission, 1, and so does the solver: 2e-6 each,
+        // in each of the reflections that follow, some ten that count
+        close("S-PLATES-J1", diffuse, cases::value("S-PLATES-J1"), 4e-5);
         let total = kernel::radiance(lit, [0.4, 0.3, 0.8], [0.1, 0.2, -1.0], 0);
         // the chain of a ray ends at 0.05 of the tolerance
         close("S-PLATES-G1", total, cases::value("S-PLATES-G1"), 2e-4);
@@ -257,8 +258,8 @@ fn radiances(factors: &[Vec<f64>], light: &[f64], rho: f64) -> Vec<f64> {
 }
 
 /// 65,536 rays a row, a sequence for each of its four parts: a factor F is good to sqrt(F (1 - F)) (n/4)^-2/3 / 2, at
-/// most 0.5 x 7.8e-4.
-const BY_RAYS: f64 = 3.9e-4;
+/// most 0.5 x 7.8e-4; and twice that, as of any such error.
+const BY_RAYS: f64 = 7.8e-4;
 
 #[test]
 fn plates_that_see_themselves_in_mirrors() {
