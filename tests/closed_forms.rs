@@ -301,7 +301,8 @@ fn an_infinite_groove_between_perfect_mirrors() {
     for (id, rho_d, rho_s) in [("M-WEDGE2D-45-0.6-0.9", 0.6, 0.9), ("M-WEDGE2D-45-1-1", 1.0, 1.0)] {
         let materials = [Material::new(rho_d, 0.0), Material::new(0.0, rho_s), Material::new(0.0, 1.0)];
         let scene = Scene::new(&mesh, &materials);
-        geometry(&scene, &within(2e-4), |_, geometry| {
+        // half as many rays: their chains are long
+        geometry(&scene, &within(5e-4), |_, geometry| {
             let (factors, light) = by_quads(geometry, 1);
             // the row's sum is 1 for perfect mirrors; else as above, F11' being 0.29
             close(id, radiances(&factors, &light, rho_d)[0], cases::value(id), 1.5 * BY_RAYS);
