@@ -31,7 +31,7 @@ fn scene(diffuse: f64, specular: f64) -> Scene {
     let material =
         Material { diffuse: vec![diffuse], specular: vec![specular], emission: vec![0.0], gloss: None };
     Scene {
-        tolerance: 8e-3,
+        tolerance: 1e-2,
         bands: 1,
         max_bounces: None,
         reference_radiance: None,
