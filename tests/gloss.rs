@@ -252,6 +252,22 @@ fn a_lobe_shows_the_sun_once() {
 }
 
 #[test]
+fn a_mirror_shows_the_sun_as_a_cone() {
+    // the paper's device in three dimensions: one ray of an ideal mirror in the lobe's place, and a sun as wide as the
+    // cone, which keeps its energy; nothing is evaluated besides
+    for (degrees, tilt, sees) in [(2.0, 1.0f64, true), (9.0, 8.9, true), (9.0, 9.1, false)] {
+        let tilt = tilt.to_radians();
+        let (mut case, _) = plate(10.0, SunOf::new([tilt.sin(), 0.0, tilt.cos()], &[2.0], degrees));
+        case.materials = vec![Material::new(0.0, RHO)];
+        let seen = case
+            .with_lit(1, &within(2e-3), |_, lit| kernel::radiance(lit, [0.4, 0.5, 3.0], [0.0, 0.0, -1.0], 0));
+        let cone = 2.0 / (PI * degrees.to_radians().sin().powi(2));
+        // rounding
+        assert!((seen - if sees { RHO * cone } else { 0.0 }).abs() < 1e-12 * cone, "{degrees}: {seen}");
+    }
+}
+
+#[test]
 fn highlights_beyond_f32_are_refused() {
     for (ratio, irradiance, fits) in
         [(3.0, 1e36, true), (50.0, 1e36, false), (9000.0, 1e36, false), (9000.0, 1e30, true)]

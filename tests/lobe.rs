@@ -44,7 +44,10 @@ fn solid_angle_and_half_energy_angles() {
         // printed to five decimals and to two
         assert!((1.0 / lobe.value(1.0) - omega).abs() < 5e-6);
         assert!((1.0 / lobe.value(1.0) - PI * f64::ln(ratio * ratio) / (ratio * ratio - 1.0)).abs() < 1e-14);
+        assert!((lobe.equivalent_solid_angle(1.0) - omega).abs() < 5e-6);
+        assert!((lobe.equivalent_solid_angle(0.2) * lobe.value(1.0) - lobe.albedo(0.2)).abs() < 1e-15);
         let angle = lobe.sample(Vec3::Z, Vec3::Z, 0.5, 0.3).z.acos().to_degrees();
+        assert!((lobe.cone(0.5).to_degrees() - angle).abs() < 1e-9 && lobe.cone(0.0) == 0.0);
         assert!((angle - half).abs() < 6e-3, "{ratio}: {angle}");
     }
     assert_eq!(lobe(3.0).value(0.0), 0.0);
@@ -62,12 +65,28 @@ fn albedo_means() {
         let angle = |t: f64| t * PI / 2.0;
         let a = |t: f64| 0.8 * lobe.albedo(cos(angle(t)));
         // printed to four decimals
-        let got = mean(4000, |t| a(t) * cos(angle(t)) * PI / 2.0);
-        assert!((got - line).abs() < 6e-5, "{ratio}: {got}");
-        let got = mean(4000, |t| a(t) * sin(2.0 * angle(t)) * PI / 2.0);
-        assert!((got - hemisphere).abs() < 6e-5, "{ratio}: {got}");
-        let got = mean(4000, a);
-        assert!((got - plain).abs() < 6e-5, "{ratio}: {got}");
+        for (got, want, closed) in [
+            (mean(4000, |t| a(t) * cos(angle(t)) * PI / 2.0), line, lobe.line_mean_albedo()),
+            (mean(4000, |t| a(t) * sin(2.0 * angle(t)) * PI / 2.0), hemisphere, lobe.cosine_mean_albedo()),
+            (mean(4000, a), plain, lobe.mean_albedo()),
+        ] {
+            assert!((got - want).abs() < 6e-5, "{ratio}: {got}");
+            // the midpoint rule of 4,000 points, on an integrand that bends within 1/ratio of its end
+            assert!((got - 0.8 * closed).abs() < 2e-6, "{ratio}: {got} {closed}");
+        }
+    }
+    // at a ratio of 1 A is (1 + cos)/2, and nothing happens on the way there
+    for excess in [0.0, 1e-15, 1e-12, 1e-9, 1e-7, 4.9e-4, 5.1e-4] {
+        let lobe = lobe(1.0 + excess);
+        let near = excess + 1e-12;
+        assert!((lobe.line_mean_albedo() - 0.5 - PI / 8.0).abs() < near, "{excess}");
+        assert!((lobe.cosine_mean_albedo() - 5.0 / 6.0).abs() < near, "{excess}");
+        assert!((lobe.mean_albedo() - 0.5 - 1.0 / PI).abs() < near, "{excess}");
+    }
+    for ratio in [1e3, 9999.0, 1e4] {
+        let lobe = lobe(ratio);
+        let means = [lobe.mean_albedo(), lobe.cosine_mean_albedo(), lobe.line_mean_albedo()];
+        assert!(means.windows(2).all(|w| w[0] < w[1]) && means[2] < 1.0, "{means:?}");
     }
 }
 

@@ -13,6 +13,7 @@
 
 use crate::error::{Error, Field};
 use crate::math::{FRAC_PI_2, PI, TAU, Vec3, atan, cos, exp, fabs, floor, frame, log, sin, sqrt};
+use crate::quadrature::rule;
 use crate::scene::MIRROR_AXIS_RATIO;
 
 /// The golden ratio's fraction: azimuth step, in turns, of a sunflower's seeds.
@@ -76,6 +77,52 @@ impl Lobe {
         let rise = (c + (self.ratio + 1.0) * c * c / (1.0 + root)) / (1.0 + c);
         let half = 0.5 * rise * log_slope(rise * excess) / self.log_slope;
         if cos_theta >= 0.0 { 0.5 + half } else { 0.5 - half }
+    }
+
+    /// Omega_eq of eq. (19) in steradians, the solid angle of a top hat of the lobe's peak and visible energy; at
+    /// `cos_theta` = 1 pi ln(T^2)/(T^2 - 1).
+    pub fn equivalent_solid_angle(&self, cos_theta: f64) -> f64 {
+        self.albedo(cos_theta) / self.peak
+    }
+
+    /// The plain mean of A/rho_0 over the angle of incidence, eq. (17): the paper's rho_s of a single ray; 1e-12.
+    pub fn mean_albedo(&self) -> f64 {
+        mean_over_angle(|cos_theta| self.albedo(cos_theta))
+    }
+
+    /// The mean of A/rho_0 over the hemisphere of directions weighed by their cosine, that of an orthographic image
+    /// of a sphere: 1/2 + (T acosh(T)/sqrt(T^2 - 1) - 1)/(2 ln T).
+    pub fn cosine_mean_albedo(&self) -> f64 {
+        // A by parts, with F' in place of F
+        let e = (self.ratio - 1.0).max(1e-12);
+        let k2 = e * (2.0 + e);
+        let k = sqrt(k2);
+        // asinh(k)/k - 1
+        let defect = if k2 < 1e-3 {
+            -k2 / 6.0 * (1.0 - 9.0 / 20.0 * k2 * (1.0 - 25.0 / 42.0 * k2 * (1.0 - 49.0 / 72.0 * k2)))
+        } else {
+            log(k + self.ratio) / k - 1.0
+        };
+        0.5 + 0.5 * (e + (1.0 + e) * defect) / (e * log_slope(e))
+    }
+
+    /// The mean of A/rho_0 over one plane of incidence weighed by the cosine, that of a scan line across a
+    /// cylinder: 1/2 + pi (T/agm(1, T) - 1)/(4 ln T), with the arithmetic-geometric mean.
+    pub fn line_mean_albedo(&self) -> f64 {
+        let e = (self.ratio - 1.0).max(1e-12);
+        // Gauss's iteration on what the two means exceed 1 by
+        let (mut a, mut g) = (e, 0.0);
+        for _ in 0..8 {
+            let product = a + g + a * g;
+            (a, g) = (0.5 * (a + g), product / (1.0 + sqrt(1.0 + product)));
+        }
+        0.5 + 0.25 * PI * (e - a) / ((1.0 + a) * e * log_slope(e))
+    }
+
+    /// Angle to the mirror direction, radians, of the cone that holds the share `u` (0 to 1) of the whole lobe's
+    /// energy: the inverse of the lobe's cumulative energy, asin sqrt((T^(2u) - 1)/(T^2 - 1)).
+    pub fn cone(&self, u: f64) -> f64 {
+        atan(self.slope(u.clamp(0.0, 1.0 - 1e-12)))
     }
 
     /// A direction of the lobe above the facet for (`u`, `v`) in the unit square, with equal energy per area:
@@ -182,6 +229,23 @@ impl Lobe {
         let (a, b) = (sqrt(x * x + inverse * inverse), sqrt(x * x + 1.0));
         (a, (1.0 - inverse) * (1.0 + inverse) / (a * (a + b)))
     }
+}
+
+/// The mean over the angle of incidence, 0 to 90 degrees, of an albedo given by that angle's cosine.
+pub(crate) fn mean_over_angle(albedo: impl Fn(f64) -> f64) -> f64 {
+    // narrow lobes bend next to grazing: panels that halve toward it
+    const PANELS: usize = 20;
+    let (nodes, weights) = rule(16);
+    let (mut sum, mut width) = (0.0, FRAC_PI_2);
+    for panel in 1..=PANELS {
+        let rest = if panel == PANELS { 0.0 } else { 0.5 * width };
+        for (x, w) in nodes.iter().zip(weights) {
+            let from_grazing = rest + (width - rest) * x;
+            sum += w * (width - rest) * albedo(sin(from_grazing));
+        }
+        width = rest;
+    }
+    sum / FRAC_PI_2
 }
 
 /// zeta + atan(e m)/e with m = s c/((1 + e) c^2 + s^2): pi/2 of it is all.

@@ -92,7 +92,11 @@ pub struct Sweeps {
 impl Sweeps {
     /// Before the first sweep of a system of contraction `q` (the largest over all rows).
     pub fn new(q: f64, tolerance: f64, max_bounces: Option<u32>) -> Sweeps {
-        let goal = 1e-3 * tolerance;
+        Sweeps::until(q, 1e-3 * tolerance, max_bounces)
+    }
+
+    /// The same until the bound on the error is at most `goal`.
+    pub fn until(q: f64, goal: f64, max_bounces: Option<u32>) -> Sweeps {
         let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
         // a sweep adds a reflection, and so does what sees the radiances
         let allowed = max_bounces.map_or(u32::MAX, |b| b.saturating_sub(1));

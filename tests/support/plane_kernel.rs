@@ -39,18 +39,20 @@ pub fn method(letter: char) -> Settings {
         'H' => (Basis::Linear, Method::Facets { chains: 4 }),
         _ => panic!("no method {letter}"),
     };
-    Settings { basis, method, max_bounces: None, cutoff: 1e-9, solver: 1e-10 }
+    Settings { basis, method, max_bounces: None, cutoff: 1e-9, solver: 1e-10, tolerance: 1e-3 }
 }
 
-/// Solves a scene whose surfaces are cut into `elements` and hands the solution over.
+/// Solves a scene whose surfaces are cut into `elements` and hands the solution over. `rays` of lobes: `None` leaves
+/// them to the settings' tolerance.
 pub fn solve<R>(
     scene: &Scene,
     elements: u32,
-    rays: RaySet,
+    rays: impl Into<Option<RaySet>>,
     light: &Light<'_>,
     settings: &Settings,
     with: impl FnOnce(&Solved<'_>, &Report, &mut Scratch<'_>) -> R,
 ) -> R {
+    let rays = rays.into();
     let material = |s: &Surface| PlaneMaterial {
         diffuse: s.diffuse,
         specular: s.specular,

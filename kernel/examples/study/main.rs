@@ -5,11 +5,15 @@
 //! ```
 //!
 //! FOLDER is created where it is missing; default `study`. The page beside this file puts what comes out beside what
-//! the paper says. All but figure 1 runs on one thread in about a minute.
+//! the paper says. All but figure 1 runs on one thread in about a minute and a half.
 
 #![allow(dead_code)] // of the render program's modules it takes the scene and the pipeline
 
+#[path = "../../../tests/support/case.rs"]
+mod case;
 mod chart;
+#[path = "../../../tests/support/cylinders.rs"]
+mod cylinders;
 mod diffuse;
 mod figure1;
 mod gloss;
@@ -17,6 +21,9 @@ mod gloss;
 mod plane_kernel;
 #[path = "../../../tests/support/plane_reference/mod.rs"]
 mod plane_reference;
+mod space;
+#[path = "../../../tests/support/mod.rs"]
+mod support;
 
 #[path = "../render/aircraft.rs"]
 mod aircraft;
@@ -77,6 +84,7 @@ fn run(folder: &std::path::Path) -> Result<(), Box<dyn Error>> {
         diffuse::bounces(),
     ]
     .into_iter()
+    .chain(space::rays())
     .chain(diffuse::convergence())
     {
         figure.write(folder)?;

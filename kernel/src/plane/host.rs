@@ -1,13 +1,14 @@
 //! The owning layer over the plane model, for programs with a heap: one thread, as the paper's times are.
 
 use crate::arena::Memory;
-use crate::error::Error;
+use crate::error::{Error, Field};
 use crate::plane::image::{self, Seen, Solved, View};
 use crate::plane::light::{self, Light};
-use crate::plane::rows::{self, Method, RowInfo, RowSettings};
+use crate::plane::rows::{self, Method, RowInfo, RowSettings, check_bounces};
 use crate::plane::scene::{Basis, PlaneInput, PlaneScene};
-use crate::plane::solve::{System, bound, sweeps};
+use crate::plane::solve::{System, bound};
 use crate::plane::view::Scratch;
+use crate::policy::Sweeps;
 use std::vec;
 use std::vec::Vec;
 
@@ -18,17 +19,20 @@ pub struct Settings {
     pub basis: Basis,
     /// How rows are integrated.
     pub method: Method,
-    /// Light reflected more often does not count; `None`: by `cutoff`.
+    /// Light reflected more often does not count, 1 to 64; `None`: by `cutoff`.
     pub max_bounces: Option<u32>,
     /// Chains end where their mirrors leave less than this share.
     pub cutoff: f64,
     /// Bound on the solver's error, relative to the brightest light.
     pub solver: f64,
+    /// Wanted error, relative to the sky: chooses the rays of lobes that have none of their own.
+    pub tolerance: f64,
 }
 
 impl Settings {
     /// Settings with which bodies that are cut finely enough reach this error, relative to the sky: circles of
-    /// 12 elements at 1e-4 and of 16 at 1e-5 in the two-circle study, more where bodies nearly touch.
+    /// 12 elements at 1e-4 and of 16 at 1e-5 in the two-circle study, more where bodies nearly touch. A tolerance
+    /// beyond 1e-13 to 0.1 is refused by [`solve`].
     pub fn for_tolerance(tolerance: f64) -> Settings {
         let t = tolerance.clamp(1e-13, 0.1);
         let points = if t >= 5e-5 {
@@ -44,6 +48,7 @@ impl Settings {
             max_bounces: None,
             cutoff: 0.1 * t,
             solver: 0.01 * t,
+            tolerance,
         }
     }
 }
@@ -61,7 +66,7 @@ pub struct Report {
     pub contraction: f64,
     /// Sweeps made.
     pub sweeps: u32,
-    /// Certified bound on the solver's error.
+    /// Bound on the solver's error: certified where the contraction is below 1, else by the sweeps' observed decay.
     pub solver: f64,
     /// Certified bound on what cut chains of a row could still bring, relative to the brightest light.
     pub tail: f64,
@@ -70,20 +75,22 @@ pub struct Report {
 /// Solves a scene and hands the solution, the report and working memory to `with`.
 ///
 /// # Errors
-/// Those of the stages; [`Error::Diverges`] where a closed part of the scene reflects all light.
+/// Those of the stages; [`Error::Range`] where a setting is out of range; [`Error::Diverges`] where a closed part of the scene reflects all light.
 pub fn solve<R>(
     input: &PlaneInput<'_>,
     light: &Light<'_>,
     settings: &Settings,
     with: impl FnOnce(&Solved<'_>, &Report, &mut Scratch<'_>) -> R,
 ) -> Result<R, Error> {
+    let rows =
+        RowSettings { method: settings.method, max_bounces: settings.max_bounces, cutoff: settings.cutoff };
+    check_bounces(&rows)?;
+    check_settings(settings)?;
     let mut memory = Memory::new(PlaneScene::bytes(input)?);
-    let scene = PlaneScene::new(input, settings.basis, memory.bytes_mut())?;
+    let scene = PlaneScene::new(input, settings.basis, settings.tolerance, memory.bytes_mut())?;
     let cuts = light.cuts().len();
     let mut memory = Memory::new(Scratch::bytes(&scene, cuts)?);
     let mut scratch = Scratch::new(&scene, cuts, memory.bytes_mut())?;
-    let rows =
-        RowSettings { method: settings.method, max_bounces: settings.max_bounces, cutoff: settings.cutoff };
     let (unknowns, classes) = (scene.unknowns(), rows::classes(&rows));
     let diffuse = input.bodies.iter().any(|b| input.materials[b.material].diffuse > 0.0);
     let mut report = Report { unknowns, ..Report::default() };
@@ -110,6 +117,16 @@ pub fn solve<R>(
     Ok(with(&solved, &report, &mut scratch))
 }
 
+/// Refuses shares that are none.
+fn check_settings(settings: &Settings) -> Result<(), Error> {
+    for value in [settings.cutoff, settings.solver] {
+        if !(0.0..=1.0).contains(&value) {
+            return Err(Error::Range { field: Field::Tolerance, band: 0, value });
+        }
+    }
+    Ok(())
+}
+
 /// Solves the system, level by level or by sweeps.
 fn relax(
     system: &System<'_>,
@@ -118,30 +135,37 @@ fn relax(
     radiance: &mut Vec<f64>,
     report: &mut Report,
 ) -> Result<(), Error> {
-    if let Some(most) = settings.max_bounces {
-        for bounces in 1..=most.max(1) as usize {
+    if settings.max_bounces.is_some() {
+        for bounces in 1..=system.levels() {
             let (lower, to) = radiance.split_at_mut((bounces - 1) * unknowns);
             system.level(0..unknowns, bounces, lower, &mut to[..unknowns]);
         }
         return Ok(());
     }
     report.contraction = system.contraction(0..unknowns);
-    let most = sweeps(report.contraction, settings.solver.max(1e-15)).saturating_add(8);
-    if most > 1_000_000 {
-        return Err(Error::Diverges { row_sum: report.contraction });
-    }
+    let goal = settings.solver.max(1e-15);
+    let mut sweeps = Sweeps::until(report.contraction, goal, None);
     let mut next = radiance.clone();
-    let mut scale = 0.0;
-    while report.sweeps < most {
+    // from no light, the first change is the brightest radiance before interreflection
+    let (mut scale, mut before, mut decay) = (0.0, 0.0, f64::INFINITY);
+    while sweeps.more() {
         let change = system.sweep(0..unknowns, radiance, &mut next);
         core::mem::swap(radiance, &mut next);
-        report.sweeps += 1;
-        report.solver = bound(change, report.contraction);
         scale = f64::max(scale, change);
-        if report.solver <= settings.solver * scale {
-            break;
+        sweeps.took(if scale > 0.0 { change / scale } else { 0.0 })?;
+        report.solver = sweeps.error * scale;
+        if report.contraction >= 1.0 {
+            // polynomials have negative weights: sweeps contract that no row's absolute sum proves to
+            let latest = change / before;
+            report.solver = bound(change, f64::max(latest, decay));
+            decay = latest;
+            if change == 0.0 || report.solver <= goal * scale {
+                break;
+            }
         }
+        before = change;
     }
+    report.sweeps = sweeps.done;
     Ok(())
 }
 

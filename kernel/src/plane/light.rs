@@ -3,7 +3,7 @@
 use crate::error::{Error, Field};
 use crate::math::{cos, fabs, sin};
 use crate::plane::lobe::PlaneLobe;
-use crate::plane::rows::{Gather, RowSettings, class, gather};
+use crate::plane::rows::{Gather, RowSettings, check_bounces, class, gather};
 use crate::plane::scene::PlaneScene;
 use crate::plane::trace::{Hit, Leg, Sink};
 use crate::plane::view::Scratch;
@@ -230,8 +230,8 @@ impl Sink for Gatherer<'_> {
 /// [`crate::plane::rows::fill`] wrote for the same range: under a uniform sky and no sun nothing is traced.
 ///
 /// # Errors
-/// [`Error::Length`]; [`Error::Mismatch`] where the scratch is another scene's or has no room for the light's
-/// cuts.
+/// [`Error::Range`] of the reflections that count; [`Error::Length`]; [`Error::Mismatch`] where the scratch is
+/// another scene's or has no room for the light's cuts.
 pub fn fill(
     scene: &PlaneScene<'_>,
     light: &Light<'_>,
@@ -241,6 +241,7 @@ pub fn fill(
     out: &mut [f64],
     scratch: &mut Scratch<'_>,
 ) -> Result<(), Error> {
+    check_bounces(settings)?;
     let classes = classes(settings);
     for (what, given) in [("open shares", open.len()), ("plane light", out.len())] {
         let expected = range.len() * classes;

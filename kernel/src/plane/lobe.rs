@@ -6,9 +6,9 @@
 
 use crate::arena::plain_struct;
 use crate::error::{Error, Field};
-use crate::math::{FRAC_1_PI, FRAC_PI_2, PI, atan, cos, sqrt, tan};
+use crate::lobe::mean_over_angle;
+use crate::math::{PI, atan, sqrt, tan};
 use crate::plane::{Vec2, cross, turned};
-use crate::quadrature::rule;
 use crate::scene::MIRROR_AXIS_RATIO;
 
 plain_struct! {
@@ -73,19 +73,7 @@ impl PlaneLobe {
 
     /// The plain mean of A/rho_0 over the angle of incidence: the paper's best rho_s, eq. (17).
     pub fn mean_albedo(&self) -> f64 {
-        // A bends within 1/k of grazing: panels that halve toward it
-        let (nodes, weights) = rule(16);
-        let mut sum = 0.0;
-        let mut width = FRAC_PI_2;
-        for panel in 0..20 {
-            let (to, rest) = (width, if panel == 19 { 0.0 } else { 0.5 * width });
-            for (x, w) in nodes.iter().zip(weights) {
-                let from_grazing = rest + (to - rest) * x;
-                sum += w * (to - rest) * self.albedo(cos(FRAC_PI_2 - from_grazing));
-            }
-            width = rest;
-        }
-        2.0 * FRAC_1_PI * sum
+        mean_over_angle(|cos_theta| self.albedo(cos_theta))
     }
 
     /// The mean of A/rho_0 weighed by the cosine, 1/2 int A cos: the best rho_s of an orthographic image of a

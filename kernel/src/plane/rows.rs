@@ -2,7 +2,7 @@
 //! or by way of mirrors and lobes, itself included, and which share the sky (eq. 12).
 
 use crate::arena::plain_struct;
-use crate::error::Error;
+use crate::error::{Error, Field};
 use crate::math::{floor, sqrt};
 use crate::plane::light::Light;
 use crate::plane::scene::{PlaneScene, Primitive};
@@ -54,6 +54,16 @@ plain_struct! {
 /// Reflection counts told apart: one where all count, else the most that count.
 pub fn classes(settings: &RowSettings) -> usize {
     settings.max_bounces.map_or(1, |most| most.clamp(1, 64) as usize)
+}
+
+/// Refuses more reflections than are told apart.
+pub(crate) fn check_bounces(settings: &RowSettings) -> Result<(), Error> {
+    match settings.max_bounces {
+        Some(most) if !(1..=64).contains(&most) => {
+            Err(Error::Range { field: Field::MaxBounces, band: 0, value: f64::from(most) })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The class of a chain of `depth` mirrors, if it counts.
@@ -115,8 +125,8 @@ impl Sink for Row<'_> {
 /// nothing diffusely stay 0.
 ///
 /// # Errors
-/// [`Error::Length`] where a slice does not fit the range; [`Error::Mismatch`] where the scratch is another
-/// scene's.
+/// [`Error::Range`] of the reflections that count; [`Error::Length`] where a slice does not fit the range;
+/// [`Error::Mismatch`] where the scratch is another scene's.
 pub fn fill(
     scene: &PlaneScene<'_>,
     settings: &RowSettings,
@@ -126,6 +136,7 @@ pub fn fill(
     info: &mut [RowInfo],
     scratch: &mut Scratch<'_>,
 ) -> Result<(), Error> {
+    check_bounces(settings)?;
     let (classes, unknowns) = (classes(settings), scene.unknowns());
     let rows = range.len();
     let size = classes.saturating_mul(unknowns);
@@ -343,7 +354,7 @@ impl Station<'_> {
         let sun = self.light.filter(|l| l.sun().is_some());
         let mut normal = self.normal;
         let faintest = sqrt(self.cutoff);
-        while leg.through > faintest && leg.depth <= self.chains.most {
+        while leg.through > faintest && leg.depth <= self.chains.most.min(LONGEST_TOLD_APART) {
             let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip) else {
                 // chains that escape to either side of a trapped one
                 mix(u64::from(cross(normal, leg.direction) > 0.0));
@@ -369,6 +380,9 @@ impl Station<'_> {
         hash
     }
 }
+
+/// Longer chains are told apart by their first mirrors alone: between perfect mirrors they need not end.
+const LONGEST_TOLD_APART: u32 = 256;
 
 /// First guesses a span at where chains change.
 const PROBES: usize = 12;

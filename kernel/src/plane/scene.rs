@@ -4,7 +4,7 @@ mod check;
 mod layout;
 
 use crate::arena::{Arena, Need, plain_struct};
-use crate::error::Error;
+use crate::error::{Error, Field};
 use crate::math::{TAU, asin, atan2, cos, floor, sin};
 use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;
@@ -42,7 +42,8 @@ impl RaySet {
     pub fn for_tolerance(tolerance: f64, axis_ratio: f64) -> RaySet {
         match tolerance {
             t if t >= 1e-2 => RaySet::Split([4, 2, 1]),
-            t if t >= 2e-3 && axis_ratio >= 5.0 => RaySet::Gauss([32, 6, 1]),
+            t if t >= 2e-3 && axis_ratio >= 9.5 => RaySet::Gauss([32, 6, 1]),
+            t if t >= 2e-3 && axis_ratio >= 3.5 => RaySet::Split([12, 6, 2]),
             t if t >= 2e-3 => RaySet::Split([8, 4, 2]),
             t if t >= 1e-3 => RaySet::Split([24, 8, 2]),
             _ => RaySet::Split([32, 16, 8]),
@@ -55,8 +56,8 @@ impl RaySet {
 pub struct PlaneGloss {
     /// Long over short axis, >= 1; 1e4 and above: an ideal mirror.
     pub axis_ratio: f64,
-    /// The rays that stand for it.
-    pub rays: RaySet,
+    /// The rays that stand for it; `None`: those of [`RaySet::for_tolerance`] at the scene's tolerance.
+    pub rays: Option<RaySet>,
 }
 
 /// Reflectances of a surface; diffuse + specular <= 1.
@@ -199,14 +200,14 @@ plain_struct! {
 }
 
 impl Material {
-    fn new(input: &PlaneMaterial) -> Result<Material, Error> {
+    fn new(input: &PlaneMaterial, tolerance: f64) -> Result<Material, Error> {
         let kept = Material { diffuse: input.diffuse, specular: input.specular, ..Material::default() };
         let Some(gloss) = input.gloss.filter(|g| g.axis_ratio < MIRROR_AXIS_RATIO && input.specular > 0.0)
         else {
             return Ok(kept);
         };
         let kept = Material { lobe: PlaneLobe::new(gloss.axis_ratio)?, ..kept };
-        Ok(match gloss.rays {
+        Ok(match gloss.rays.unwrap_or_else(|| RaySet::for_tolerance(tolerance, gloss.axis_ratio)) {
             RaySet::Paper { spacing, renormalised } => {
                 Material { set: if renormalised { 2 } else { 1 }, spacing, ..kept }
             }
@@ -261,13 +262,22 @@ impl<'m> PlaneScene<'m> {
             .bytes()
     }
 
-    /// Checks the input and lays it out.
+    /// Checks the input and lays it out. `tolerance`, 1e-13 to 0.1 of a uniform sky, chooses the rays of lobes that
+    /// have none of their own.
     ///
     /// # Errors
-    /// Every fault of the input with its index ([`Error::Body`], [`Error::MaterialRange`],
+    /// [`Error::Range`] of the tolerance; every fault of the input with its index ([`Error::Body`], [`Error::MaterialRange`],
     /// [`Error::ReflectanceSum`], [`Error::MaterialOutOfRange`], [`Error::NoFacets`], [`Error::NoMaterials`]);
     /// [`Error::BufferTooSmall`].
-    pub fn new(input: &PlaneInput<'_>, basis: Basis, memory: &'m mut [u8]) -> Result<PlaneScene<'m>, Error> {
+    pub fn new(
+        input: &PlaneInput<'_>,
+        basis: Basis,
+        tolerance: f64,
+        memory: &'m mut [u8],
+    ) -> Result<PlaneScene<'m>, Error> {
+        if !(1e-13..=0.1).contains(&tolerance) {
+            return Err(Error::Range { field: Field::Tolerance, band: 0, value: tolerance });
+        }
         check(input)?;
         let mut arena = Arena::new(memory, PlaneScene::bytes(input)?)?;
         let count = input.bodies.iter().map(|b| segments(&b.shape)).sum();
@@ -275,7 +285,7 @@ impl<'m> PlaneScene<'m> {
         let bodies = arena.take::<Body>(input.bodies.len())?;
         let materials = arena.take::<Material>(input.materials.len())?;
         for (material, kept) in input.materials.iter().zip(materials.iter_mut()) {
-            *kept = Material::new(material)?;
+            *kept = Material::new(material, tolerance)?;
         }
         let (mut first, mut elements) = (0, 0u32);
         for (index, (body, kept)) in input.bodies.iter().zip(bodies.iter_mut()).enumerate() {

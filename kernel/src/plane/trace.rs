@@ -193,6 +193,14 @@ impl Chains<'_> {
         }
     }
 
+    /// The leg's share of a lobe's energy along `direction`. At a path's first two lobes the chain's floor shrinks
+    /// with the share: what the reflectances leave decides where it ends, not into how many rays a lobe is split.
+    /// Beyond, small shares end, so that trees that branch at every lobe are finite.
+    fn part(leg: &Leg, direction: Vec2, share: f64) -> Leg {
+        let floor = if leg.lobes <= 2 { leg.floor * share } else { leg.floor };
+        Leg { direction, through: leg.through * share, floor, ..*leg }
+    }
+
     /// The rays that stand for a lobe around `leg.direction`.
     fn branch<S: Sink>(
         &self,
@@ -213,8 +221,7 @@ impl Chains<'_> {
                 let width = visible.high - visible.low;
                 nodes(count(counts), |x, w| {
                     let direction = lobe.direction(leg.direction, visible.low + width * x);
-                    let through = leg.through * 0.5 * width * w;
-                    self.follow(Leg { direction, through, ..leg }, sink, scratch);
+                    self.follow(Self::part(&leg, direction, 0.5 * width * w), sink, scratch);
                 });
             }
             RaySet::Equal(counts) => {
@@ -222,8 +229,7 @@ impl Chains<'_> {
                 for i in 0..n {
                     let x = (i as f64 + 0.5) / n as f64;
                     let direction = lobe.direction(leg.direction, visible.low + width * x);
-                    let through = leg.through * 0.5 * width / n as f64;
-                    self.follow(Leg { direction, through, ..leg }, sink, scratch);
+                    self.follow(Self::part(&leg, direction, 0.5 * width / n as f64), sink, scratch);
                 }
             }
             RaySet::Split(counts) => {
@@ -243,8 +249,7 @@ impl Chains<'_> {
                     }
                     graded(if sky { self.sky_nodes } else { n }, |x, w| {
                         let direction = lobe.direction(leg.direction, low + (high - low) * x);
-                        let through = leg.through * 0.5 * (high - low) * w;
-                        let ray = Leg { direction, through, ..leg };
+                        let ray = Self::part(&leg, direction, 0.5 * (high - low) * w);
                         if sky { sink.escape(&ray) } else { self.follow(ray, sink, &mut rest) }
                     });
                 }
@@ -276,8 +281,7 @@ impl Chains<'_> {
         };
         for (direction, weight) in rays {
             if rises(direction) {
-                let through = leg.through * weight * share;
-                self.follow(Leg { direction, through, ..leg }, sink, scratch);
+                self.follow(Self::part(&leg, direction, weight * share), sink, scratch);
             }
         }
     }

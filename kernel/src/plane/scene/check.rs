@@ -43,8 +43,9 @@ fn check_gloss(material: usize, gloss: &PlaneGloss) -> Result<(), Error> {
         return Err(Error::MaterialRange { material, band: 0, field: Field::AxisRatio, value });
     }
     let bad = match gloss.rays {
-        RaySet::Paper { spacing, .. } => (!(0.0..=3.2).contains(&spacing)).then_some(spacing),
-        RaySet::Gauss(n) | RaySet::Equal(n) | RaySet::Split(n) => {
+        None => None,
+        Some(RaySet::Paper { spacing, .. }) => (!(0.0..=3.2).contains(&spacing)).then_some(spacing),
+        Some(RaySet::Gauss(n) | RaySet::Equal(n) | RaySet::Split(n)) => {
             n.iter().find(|&&n| !(1..=4096).contains(&n)).map(|&n| f64::from(n))
         }
     };
