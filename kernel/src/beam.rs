@@ -13,6 +13,7 @@ use crate::coupling::word::EMPTY;
 use crate::coupling::{Coupling, Record, Row, TRACED};
 use crate::element::Elements;
 use crate::error::Error;
+use crate::index::Index;
 use crate::light::Shape;
 use crate::math::Vec3;
 use crate::mirror::Surface;
@@ -59,7 +60,7 @@ fn seen_area(scene: &Scene<'_>, sun: &Sun<'_>, facet: usize, side: usize) -> f64
     if scene.mirror(scene.material(facet)) == NO_MIRROR {
         return 0.0;
     }
-    scene.areas()[facet] * sun.cosine(scene.side_normal(facet, side))
+    scene.areas().at(facet) * sun.cosine(scene.side_normal(facet, side))
 }
 
 /// Traces the beams of the mirror sides in `range` (facet * sides + side) into a block of `memory`, as
@@ -100,7 +101,7 @@ struct Tracer<'a, 'm> {
 
 impl Tracer<'_, '_> {
     fn row(&mut self, row: usize) -> Option<()> {
-        let (facet, side) = (row / self.scene.sides(), row % self.scene.sides());
+        let (facet, side) = (row / self.scene.sides().max(1), row % self.scene.sides().max(1));
         let area = seen_area(self.scene, self.sun, facet, side);
         if area <= 0.0 {
             self.sink.end_row(Row::default(), Some);
@@ -136,7 +137,7 @@ impl Tracer<'_, '_> {
             return Some(());
         }
         // flux per unit of normal irradiance, the first cosine still to come
-        let (mut flux, mut word, mut arrival) = (scene.areas()[facet], EMPTY, None);
+        let (mut flux, mut word, mut arrival) = (scene.areas().at(facet), EMPTY, None);
         let mut direction = -toward;
         loop {
             let Some(mirror) = surface.mirror(scene) else { return Some(()) };
@@ -163,7 +164,7 @@ impl Tracer<'_, '_> {
             direction = leaving;
             arrival = Some(direction);
             let (target, _) = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            let area = scene.areas()[surface.facet] * self.elements.share(surface.facet);
+            let area = scene.areas().at(surface.facet) * self.elements.share(surface.facet);
             self.sink.push(Record::target(target, word, flux / area, [0.0; 2]))?;
         }
     }

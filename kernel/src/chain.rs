@@ -238,7 +238,7 @@ impl Fan {
     /// Adds the mean of all rays.
     fn mean_into(&self, terms: &mut Terms, path: &mut Path, bands: usize) {
         let share = 1.0 / f64::from(self.count.max(1));
-        for band in 0..bands {
+        for band in 0..bands.min(MAX_BANDS) {
             terms.diffuse[band] += share * self.terms.diffuse[band];
             terms.mirror_sky[band] += share * self.terms.mirror_sky[band];
             terms.mirror_diffuse[band] += share * self.terms.mirror_diffuse[band];

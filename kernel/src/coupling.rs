@@ -12,6 +12,7 @@ pub mod word;
 
 use crate::arena::{View, plain_struct};
 use crate::error::Error;
+use crate::index::Index;
 use crate::math::{Vec3, fabs};
 use core::ops::Range;
 use word::Word;
@@ -183,13 +184,13 @@ impl<'m> Block<'m> {
     /// Opens what [`rows::fill`] wrote.
     pub fn open(memory: &'m [u8]) -> Result<Block<'m>, Error> {
         let mut view = View::new(memory);
-        let head = view.take::<Head>(1)?[0];
+        let head = view.take::<Head>(1)?.at(0);
         let rows = view.take::<Row>(head.room as usize + 1)?;
         let words = view.take::<Word>(head.capacity as usize)?;
         let products = view.take::<f64>((head.capacity * head.bands) as usize)?;
         let records = view.take::<Record>(head.records as usize)?;
-        let rows = &rows[..head.rows as usize + 1];
-        Ok(Block { head, rows, words: &words[..head.words as usize], products, records })
+        let rows = rows.part(0..head.rows as usize + 1);
+        Ok(Block { head, rows, words: words.part(0..head.words as usize), products, records })
     }
 
     /// The unknowns whose rows it holds.
@@ -296,8 +297,9 @@ impl<'m> Coupling<'m> {
     /// The rows of a range of unknowns, in order.
     pub fn rows(&self, range: Range<usize>) -> impl Iterator<Item = (usize, RowView<'m>)> + use<'m> {
         let first = self.blocks.partition_point(|b| b.range().end <= range.start);
-        self.blocks[first..]
+        self.blocks
             .iter()
+            .skip(first)
             .take_while({
                 let end = range.end;
                 move |b| b.range().start < end
@@ -327,11 +329,11 @@ impl<'m> Coupling<'m> {
 
 fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
     let at = unknown - block.head.first as usize;
-    let (row, next) = (block.rows[at], block.rows[at + 1]);
+    let (row, next) = (block.rows.at(at), block.rows.at(at + 1));
     RowView {
         row,
-        targets: &block.records[row.start as usize..row.escapes as usize],
-        escapes: &block.records[row.escapes as usize..next.start as usize],
+        targets: block.records.part(row.start as usize..row.escapes as usize),
+        escapes: block.records.part(row.escapes as usize..next.start as usize),
         words: block.words,
         products: block.products,
         bands: block.head.bands as usize,

@@ -69,6 +69,35 @@ impl<T> IndexMut<T> for [T] {
     }
 }
 
+/// Length of a range. That of the standard library comes with an assertion that compilers do not always see through.
+#[inline(always)]
+pub(crate) fn span(range: &Range<usize>) -> usize {
+    range.end.saturating_sub(range.start)
+}
+
+/// Pieces of `size` values each, as of `chunks_exact_mut`, but none where that is 0.
+#[inline(always)]
+pub(crate) fn pieces<T>(values: &mut [T], size: usize) -> Pieces<'_, T> {
+    Pieces { rest: values, size }
+}
+
+/// The pieces still to come.
+pub(crate) struct Pieces<'a, T> {
+    rest: &'a mut [T],
+    size: usize,
+}
+
+impl<'a, T> Iterator for Pieces<'a, T> {
+    type Item = &'a mut [T];
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<&'a mut [T]> {
+        let (piece, rest) = core::mem::take(&mut self.rest).split_at_mut_checked(self.size)?;
+        self.rest = rest;
+        (self.size > 0).then_some(piece)
+    }
+}
+
 /// Copies as many values as both have.
 #[inline(always)]
 pub(crate) fn copy<T: Copy>(to: &mut [T], from: &[T]) {

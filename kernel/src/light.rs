@@ -7,6 +7,7 @@ use crate::bvh::Bvh;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
+use crate::index::{Index, IndexMut, copy, pieces, span};
 use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
@@ -125,32 +126,32 @@ pub fn sky_rows(
     shape: Shape,
     out: &mut [f64],
 ) -> Result<(), Error> {
-    let expected = range.len() * shape.stride();
+    let expected = span(&range) * shape.stride();
     if out.len() != expected {
         return Err(Error::Length { what: "irradiance table", expected, given: out.len() });
     }
     if !sky.is_uniform() && !coupling.is_directional() {
         return Err(Error::Mismatch { what: "coupling without directions" });
     }
-    let bands = shape.bands;
+    let bands = shape.bands.clamp(1, MAX_BANDS);
     let mut unobstructed = [0.0; MAX_BANDS];
     let mut of = None;
-    for ((unknown, row), values) in coupling.rows(range).zip(out.chunks_exact_mut(shape.stride())) {
+    for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
         values.fill(0.0);
         if row.row.state == ABSENT {
             continue;
         }
         let (facet, side) = elements.facet_of(unknown);
         if of != Some((facet, side)) {
-            sky.irradiance(scene.side_normal(facet, side), relative_error, &mut unobstructed[..bands]);
+            sky.irradiance(scene.side_normal(facet, side), relative_error, unobstructed.head_mut(bands));
             of = Some((facet, side));
         }
-        for (level, part) in values.chunks_exact_mut(3 * bands).enumerate() {
+        for (level, part) in pieces(values, 3 * bands).enumerate() {
             if row.row.state != ENCLOSED {
-                part[..bands].copy_from_slice(&unobstructed[..bands]);
+                copy(part.head_mut(bands), &unobstructed);
             }
             add_escapes(&row, sky, shape, level, part);
-            part[..bands].iter_mut().for_each(|e| *e = e.max(0.0));
+            part.head_mut(bands).iter_mut().for_each(|e| *e = e.max(0.0));
         }
     }
     Ok(())
@@ -158,15 +159,15 @@ pub fn sky_rows(
 
 /// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors.
 fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, part: &mut [f64]) {
-    let bands = shape.bands;
+    let bands = shape.bands.clamp(1, MAX_BANDS);
     let mut radiance = [0.0; MAX_BANDS];
-    let radiance = &mut radiance[..bands];
+    let radiance = radiance.head_mut(bands);
     let uniform = sky.is_uniform();
     if uniform {
         sky.radiance(Vec3::Z, radiance);
     }
-    let (mean, gradients) = part.split_at_mut(bands);
-    let (first, second) = gradients.split_at_mut(bands);
+    let mut parts = pieces(part, bands);
+    let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else { return };
     for record in row.escapes {
         if !shape.counts(row.depth(record), level) {
             continue;
@@ -177,12 +178,13 @@ fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, par
         let blocked = record.word() == BLOCKED;
         let products = row.products(record);
         let g = record.gradient.map(f64::from);
-        for band in 0..bands {
-            let share = if blocked { -1.0 } else { products[band] };
-            let l = PI * share * radiance[band];
-            mean[band] += l * record.weight;
-            first[band] += l * g[0];
-            second[band] += l * g[1];
+        let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut()));
+        for (band, ((mean, (first, second)), radiance)) in sums.zip(radiance.iter()).enumerate() {
+            let share = if blocked { -1.0 } else { products.at(band) };
+            let l = PI * share * radiance;
+            *mean += l * record.weight;
+            *first += l * g[0];
+            *second += l * g[1];
         }
     }
 }
@@ -201,8 +203,8 @@ pub fn sun_rows(
     range: Range<usize>,
     out: &mut [f64],
 ) -> Result<u64, Error> {
-    if out.len() != range.len() {
-        return Err(Error::Length { what: "sun table", expected: range.len(), given: out.len() });
+    if out.len() != span(&range) {
+        return Err(Error::Length { what: "sun table", expected: span(&range), given: out.len() });
     }
     let mut rays = 0;
     for ((unknown, row), value) in coupling.rows(range).zip(out) {
@@ -222,7 +224,7 @@ pub fn sun_rows(
         while count < goal {
             let (p, q) = sequence.pair(count, 0);
             let (a, b) = triangle(p, q);
-            let (u, v) = elements.in_facet(unknown / scene.sides(), a, b);
+            let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
             let (s, t) = sequence.pair(count, 2);
             let toward = sun.sample(s, t);
             let surface = Surface::new(scene, facet, side, u, v);
@@ -250,7 +252,7 @@ pub fn check_reference(values: &[f64], bands: usize) -> Result<(), Error> {
         return Err(Error::LightBandCount { field, expected: bands, given: values.len() });
     }
     match values.iter().position(|v| !(*v > 0.0 && v.is_finite())) {
-        Some(band) => Err(Error::Range { field, band, value: values[band] }),
+        Some(band) => Err(Error::Range { field, band, value: values.at(band) }),
         None => Ok(()),
     }
 }

@@ -6,6 +6,7 @@
 use crate::coupling::Coupling;
 use crate::element::Elements;
 use crate::error::Error;
+use crate::index::{Index, IndexMut, copy, pieces, span};
 use crate::light::{Light, Shape};
 use crate::math::{FRAC_1_PI, PI, fabs, sqrt};
 use crate::scene::{MAX_BANDS, Scene};
@@ -49,38 +50,40 @@ impl System<'_> {
 
     /// Radiance before any reflection of the sides of `range`: their emission.
     pub fn start(&self, range: Range<usize>, radiance: &mut [f64]) {
-        for (unknown, out) in range.zip(radiance.chunks_exact_mut(self.shape.bands)) {
-            out.copy_from_slice(self.scene.emission(self.material(unknown)));
+        for (unknown, out) in range.zip(pieces(radiance, self.shape.bands)) {
+            copy(out, self.scene.emission(self.material(unknown)));
         }
     }
 
     /// One sweep over the rows of `range`: from the radiances of all unknowns (`from`) those of the range
     /// (`to`). Returns the largest change relative to `reference`, one value per band.
     pub fn sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], reference: &[f64]) -> f64 {
-        let bands = self.shape.bands;
+        let bands = self.shape.bands.clamp(1, MAX_BANDS);
         let mut change: f64 = 0.0;
         let rows = self.coupling.rows(range.clone());
-        for ((unknown, row), out) in rows.zip(to.chunks_exact_mut(bands)) {
+        for ((unknown, row), out) in rows.zip(pieces(to, bands)) {
             let material = self.material(unknown);
             let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
             let mut bounced = [0.0; MAX_BANDS];
             for record in row.targets {
-                let seen = &from[record.unknown() * bands..][..bands];
+                let first = record.unknown() * bands;
+                let seen = from.part(first..first.wrapping_add(bands));
                 let terms = seen.iter().zip(row.products(record));
                 bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
             }
-            let direct = &self.direct[self.shape.at(unknown, 0)];
-            for band in 0..bands {
-                let mut irradiance = direct[band] + PI * bounced[band];
+            let direct = self.direct.part(self.shape.at(unknown, 0));
+            for (band, (out, bounced)) in out.iter_mut().zip(bounced).enumerate() {
+                let mut irradiance = direct.at(band) + PI * bounced;
                 if let Some(sun) = &self.light.sun {
-                    irradiance += self.sun[unknown] * sun.irradiance(band);
+                    irradiance += self.sun.at(unknown) * sun.irradiance(band);
                 }
-                let new = emission[band] + diffuse[band] * FRAC_1_PI * irradiance;
-                let old = from[unknown * bands + band];
-                if reference[band] > 0.0 {
-                    change = change.max(fabs(new - old) / reference[band]);
+                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance;
+                let old = from.at(unknown * bands + band);
+                let reference = reference.at(band);
+                if reference > 0.0 {
+                    change = change.max(fabs(new - old) / reference);
                 }
-                out[band] = new;
+                *out = new;
             }
         }
         change
@@ -96,17 +99,22 @@ impl System<'_> {
         radiance: impl Fn(usize) -> &'x [f64],
         out: &mut [f64],
     ) -> Result<(), Error> {
-        let (bands, stride) = (self.shape.bands, self.shape.stride());
-        if out.len() != range.len() * stride {
-            let expected = range.len() * stride;
+        let bands = self.shape.bands.clamp(1, MAX_BANDS);
+        let stride = self.shape.stride().max(1);
+        let expected = span(&range) * stride;
+        if out.len() != expected {
             return Err(Error::Length { what: "irradiance table", expected, given: out.len() });
         }
         let part = self.shape.at(0, level);
         let mut sky = [0.0; MAX_BANDS];
-        self.light.largest_radiance(&mut sky[..bands]);
-        for ((unknown, row), values) in self.coupling.rows(range).zip(out.chunks_exact_mut(stride)) {
-            let values = &mut values[part.clone()];
-            values.copy_from_slice(&self.direct[self.shape.at(unknown, level)]);
+        self.light.largest_radiance(sky.head_mut(bands));
+        for ((unknown, row), values) in self.coupling.rows(range).zip(pieces(out, stride)) {
+            let values = values.part_mut(part.clone());
+            copy(values, self.direct.part(self.shape.at(unknown, level)));
+            let mut parts = pieces(values, bands);
+            let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else {
+                continue;
+            };
             let blocked = row.blocked();
             let share = if blocked > 0.5 { 1.0 - blocked } else { blocked };
             let mut square = sky.map(|l| (PI * l) * (PI * l) * share);
@@ -116,31 +124,33 @@ impl System<'_> {
                     continue;
                 }
                 let from = if self.shape.levels == 1 { 0 } else { level - depth as usize };
-                let seen = &radiance(from)[record.unknown() * bands..][..bands];
-                let (g, products) = (record.gradient.map(f64::from), row.products(record));
-                for band in 0..bands {
-                    let l = PI * products[band] * seen[band];
-                    values[band] += l * record.weight;
-                    values[bands + band] += l * g[0];
-                    values[2 * bands + band] += l * g[1];
-                    square[band] += l * l * record.weight;
+                let start = record.unknown() * bands;
+                let seen = radiance(from).part(start..start.wrapping_add(bands));
+                let g = record.gradient.map(f64::from);
+                let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut square);
+                let terms = row.products(record).iter().zip(seen);
+                for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
+                    let l = PI * product * seen;
+                    *mean += l * record.weight;
+                    *first += l * g[0];
+                    *second += l * g[1];
+                    *square += l * l * record.weight;
                 }
             }
-            damp(values, &square, row.row.rays, bands);
+            damp(first, second, &square, row.row.rays);
         }
         Ok(())
     }
 
     /// Diffuse radiance that the irradiance on one level makes, for the rows of `range`.
     pub fn reflect(&self, range: Range<usize>, level: usize, irradiance: &[f64], out: &mut [f64]) {
-        let bands = self.shape.bands;
-        for (unknown, out) in range.zip(out.chunks_exact_mut(bands)) {
+        for (unknown, out) in range.zip(pieces(out, self.shape.bands)) {
             let material = self.material(unknown);
             let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
-            let mean = &irradiance[self.shape.at(unknown, level)];
-            for band in 0..bands {
-                let sun = self.light.sun.as_ref().map_or(0.0, |s| self.sun[unknown] * s.irradiance(band));
-                out[band] = emission[band] + diffuse[band] * FRAC_1_PI * (mean[band] + sun);
+            let mean = irradiance.part(self.shape.at(unknown, level));
+            for (band, out) in out.iter_mut().enumerate() {
+                let sun = self.light.sun.as_ref().map_or(0.0, |s| self.sun.at(unknown) * s.irradiance(band));
+                *out = emission.at(band) + diffuse.at(band) * FRAC_1_PI * (mean.at(band) + sun);
             }
         }
     }
@@ -154,19 +164,19 @@ impl System<'_> {
 /// mean square of a linear function with these gradients over the element is `signal`; independent rays would
 /// bring 2 s^2/n of it (s^2 the mean square of a ray's light, n rays), a scrambled net sqrt(n) times less, and
 /// half of that serves best: gradients left out cost as much as noise let in.
-fn damp(values: &mut [f64], square: &[f64], rays: u32, bands: usize) {
+fn damp(first: &mut [f64], second: &mut [f64], square: &[f64], rays: u32) {
     if rays == 0 {
         return;
     }
     let n = f64::from(rays);
     let share = 1.0 / (n * sqrt(n));
-    for (band, &square) in square.iter().enumerate().take(bands) {
-        let (a, b) = (values[bands + band], values[2 * bands + band]);
+    for ((first, second), &square) in first.iter_mut().zip(second).zip(square) {
+        let (a, b) = (*first, *second);
         let signal = (a * a + b * b - a * b) / 18.0;
         let noise = share * square;
         let keep = if signal > noise { 1.0 - noise / signal } else { 0.0 };
-        values[bands + band] = a * keep;
-        values[2 * bands + band] = b * keep;
+        *first = a * keep;
+        *second = b * keep;
     }
 }
 

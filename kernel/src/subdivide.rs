@@ -6,6 +6,7 @@
 use crate::bvh::Bvh;
 use crate::element::MAX_DIVISIONS;
 use crate::error::Error;
+use crate::index::{Index, span};
 use crate::math::{Vec3, frame};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
@@ -36,15 +37,15 @@ pub fn probe(
     range: Range<usize>,
     out: &mut [f64],
 ) -> Result<u64, Error> {
-    if out.len() != range.len() {
-        return Err(Error::Length { what: "unevenness", expected: range.len(), given: out.len() });
+    if out.len() != span(&range) {
+        return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
     }
     let shining = (0..scene.bands()).any(|band| scene.largest_emission(band) > 0.0);
     let mut probe = Probe { scene, bvh, rays: rays.clamp(1, MOST_RAYS), shining, traced: 0 };
     for (facet, value) in range.zip(out) {
         *value = 0.0;
         let dark = scene.diffuse(scene.material(facet)).iter().all(|&d| d == 0.0);
-        if scene.areas()[facet] == 0.0 || dark {
+        if scene.areas().at(facet) == 0.0 || dark {
             continue;
         }
         for side in 0..scene.sides() {
@@ -168,7 +169,7 @@ pub fn divisions(
     let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
     let root = |facet: usize| {
         let rho = scene.diffuse(scene.material(facet)).iter().fold(0.0, |a: f64, &b| a.max(b));
-        libm::cbrt(scene.areas()[facet] / total * unevenness[facet] * rho * rho)
+        libm::cbrt(scene.areas().at(facet) / total * unevenness.at(facet) * rho * rho)
     };
     let goal = 0.25 * tolerance * tolerance;
     let mut factor = (0..scene.facets()).map(|f| root(f) * root(f)).sum::<f64>() / goal;

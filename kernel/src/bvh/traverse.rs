@@ -9,6 +9,7 @@
 //! right sign, and what is left is three roundings of 2^-24 relative, which [`WIDEN`] covers.
 
 use super::{Boxes, Bvh, LEAF, PAIR, Packet, STACK};
+use crate::index::IndexMut;
 use crate::math::{Vec3, fabs};
 use crate::ray::{Hit, Line, Ray};
 use crate::simd::{self, LaneTask, Lanes};
@@ -309,12 +310,15 @@ impl<L: Lanes> Beam<L> {
 #[inline(always)]
 fn push<const N: usize>(stack: &mut [u64; N], bottom: usize, top: &mut usize, entry: u64) {
     let mut place = (*top).min(N - 1);
-    while place > bottom && stack[place - 1] < entry {
-        stack[place] = stack[place - 1];
+    *top = place + 1;
+    while place > bottom
+        && let Some(&below) = stack.get(place - 1)
+        && below < entry
+    {
+        stack.set(place, below);
         place -= 1;
     }
-    stack[place] = entry;
-    *top = (*top).min(N - 1) + 1;
+    stack.set(place, entry);
 }
 
 /// Where a ray from afar enters the mesh's box, at least 0; `None` where it misses.

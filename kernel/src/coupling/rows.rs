@@ -15,6 +15,7 @@ use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::Elements;
 use crate::error::Error;
+use crate::index::Index;
 use crate::math::{Vec3, fabs, frame, pow, sqrt};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash, hash2, triangle};
@@ -99,7 +100,8 @@ const FEWEST: u32 = 64;
 
 /// The power of two nearest to so many rays.
 fn whole(rays: f64) -> u32 {
-    1 << ((rays.clamp(f64::from(FEWEST), f64::from(MOST_RAYS)) * SQRT_2) as u32).ilog2()
+    let most = (rays.clamp(f64::from(FEWEST), f64::from(MOST_RAYS)) * SQRT_2) as u32;
+    1 << most.checked_ilog2().unwrap_or(0)
 }
 
 impl RowSettings {
@@ -216,7 +218,7 @@ impl Tracer<'_, '_> {
         let (facet, side) = self.elements.facet_of(unknown);
         let material = self.scene.material(facet);
         let black = self.scene.diffuse(material).iter().all(|&d| d == 0.0);
-        if self.scene.areas()[facet] == 0.0 || (black && !self.settings.all) {
+        if self.scene.areas().at(facet) == 0.0 || (black && !self.settings.all) {
             self.sink.end_row(Row::default(), Some);
             return Some(());
         }
@@ -226,7 +228,7 @@ impl Tracer<'_, '_> {
             return Some(());
         }
         let start = Start {
-            element: unknown / self.scene.sides(),
+            element: unknown / self.scene.sides().max(1),
             facet,
             side,
             frame: frame(normal),

@@ -4,6 +4,7 @@ use super::word::{Word, Words};
 use super::{BLOCKED, Head, Record, Row};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::scene::Scene;
 use crate::sort;
 use core::cmp::Ordering;
@@ -19,7 +20,8 @@ pub fn bytes(rows: usize, records: usize, unmerged: usize, bands: usize) -> Resu
 
 /// Words that a block of so many bytes has room for: 1/16 of it.
 fn word_capacity(bytes: usize, bands: usize) -> usize {
-    (bytes / 16 / (size_of::<Word>() + 8 * bands)).clamp(16, BLOCKED as usize)
+    (bytes / 16 / size_of::<Word>().saturating_add(bands.saturating_mul(8)).max(1))
+        .clamp(16, BLOCKED as usize)
 }
 
 fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
@@ -99,19 +101,20 @@ impl<'m> Sink<'m> {
 
     /// Ends the present row with what `finish` leaves of each record: sorts and merges the records.
     pub fn end_row(&mut self, stats: Row, finish: impl Fn(Record) -> Option<Record>) {
-        let mut kept = self.start;
-        for i in self.start..self.used {
-            if let Some(record) = finish(self.records[i]) {
-                self.records[kept] = record;
+        let row = self.records.part_mut(self.start..self.used);
+        let mut kept = 0;
+        for i in 0..row.len() {
+            if let Some(record) = finish(row.at(i)) {
+                row.set(kept, record);
                 kept += 1;
             }
         }
-        let row = &mut self.records[self.start..kept];
+        let row = row.head_mut(kept);
         let words = &self.words;
         sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
         let kept = merge(row);
-        let escapes = self.start + row[..kept].partition_point(|r| !r.is_escape());
-        self.rows[self.done] = Row { start: self.start as u32, escapes: escapes as u32, ..stats };
+        let escapes = self.start + row.head(kept).partition_point(|r| !r.is_escape());
+        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..stats });
         self.done += 1;
         self.start += kept;
         self.used = self.start;
@@ -119,7 +122,9 @@ impl<'m> Sink<'m> {
 
     /// Ends the block and returns the number of rows in it.
     pub fn end(self) -> usize {
-        self.rows[self.done].start = self.used as u32;
+        if let Some(end) = self.rows.get_mut(self.done) {
+            end.start = self.used as u32;
+        }
         self.head.rows = self.done as u64;
         self.head.records = self.used as u64;
         self.head.words = self.words.used() as u64;
@@ -129,17 +134,19 @@ impl<'m> Sink<'m> {
 
 /// Adds up neighbours with the same key and returns how many records are left.
 fn merge(row: &mut [Record]) -> usize {
-    let mut kept = 0;
+    let mut kept: usize = 0;
     for i in 0..row.len() {
-        let record = row[i];
-        if kept > 0 && row[kept - 1].key == record.key {
-            let last = &mut row[kept - 1];
-            last.weight += record.weight;
-            last.gradient[0] += record.gradient[0];
-            last.gradient[1] += record.gradient[1];
-        } else {
-            row[kept] = record;
-            kept += 1;
+        let record = row.at(i);
+        match row.get_mut(kept.wrapping_sub(1)) {
+            Some(last) if last.key == record.key => {
+                last.weight += record.weight;
+                last.gradient[0] += record.gradient[0];
+                last.gradient[1] += record.gradient[1];
+            }
+            _ => {
+                row.set(kept, record);
+                kept += 1;
+            }
         }
     }
     kept
