@@ -608,7 +608,8 @@ typedef struct blik_coupling_info {
      */
     double dropped;
     /**
-     * Bytes in use.
+     * Bytes in use. Of a coupling that blik_coupling_init made: from the start of its memory, the rest of which is
+     * free again.
      */
     size_t bytes;
 } blik_coupling_info;

@@ -22,6 +22,8 @@ pub struct blik_coupling {
     pub(crate) elements: Elements<'static>,
     pub(crate) blocks: &'static [Block<'static>],
     pub(crate) settings: Settings,
+    /// Bytes of the caller's memory up to the last that is used; 0: none of it is the caller's.
+    extent: usize,
     #[cfg(feature = "std")]
     owner: Option<std::boxed::Box<Owned>>,
 }
@@ -82,6 +84,7 @@ impl blik_coupling {
             elements,
             blocks,
             settings,
+            extent: 0,
             #[cfg(feature = "std")]
             owner: None,
         }
@@ -110,7 +113,8 @@ pub struct blik_coupling_info {
     pub rays: u64,
     /// Largest weight of mirror chains that were cut, as a share of the hemisphere: a bound.
     pub dropped: f64,
-    /// Bytes in use.
+    /// Bytes in use. Of a coupling that blik_coupling_init made: from the start of its memory, the rest of which is
+    /// free again.
     pub bytes: usize,
 }
 
@@ -398,7 +402,7 @@ fn build(
     memory: &'static mut [u8],
     runner: &mut Runner,
 ) -> Result<*mut blik_coupling, blik_error> {
-    let given = memory.len();
+    let (given, start) = (memory.len(), memory.as_ptr() as usize);
     let least = least(base, settings)?;
     if given < least {
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(least, given));
@@ -438,8 +442,9 @@ fn build(
     for (block, spot) in blocks.iter_mut().zip(&*done) {
         *block = open(spot)?;
     }
+    let extent = cutter.start as usize - start;
     // SAFETY: `place` made room for it.
-    unsafe { place.write(blik_coupling::new(base, elements, blocks, *settings)) };
+    unsafe { place.write(blik_coupling { extent, ..blik_coupling::new(base, elements, blocks, *settings) }) };
     Ok(place.as_ptr())
 }
 
@@ -566,7 +571,7 @@ impl blik_coupling {
             open_rows: 0,
             rays: 0,
             dropped: 0.0,
-            bytes: matrix.memory() + self.elements.memory(),
+            bytes: self.extent.max(matrix.memory() + self.elements.memory()),
         };
         for (_, row) in matrix.rows(0..matrix.unknowns()) {
             info.rays += u64::from(row.row.rays) + u64::from(row.row.chain_rays);

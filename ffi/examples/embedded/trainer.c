@@ -1,0 +1,271 @@
+/*
+ * Blik without heap and operating system: a small craft from its facets to its image, and the same from a block that a
+ * workstation baked. Everything stands in one static array; `board.h` is all that it needs of the machine.
+ *
+ * Compiled with RENDER_ONLY it reads the baked block alone. What it prints are checksums of the bits of its results: they are the same on every machine.
+ */
+#include "board.h"
+
+#include <blik.h>
+
+enum { COLUMNS = 24, ROWS = 16, MEMORY = 2048 * 1024, PAINT = 0x5a };
+
+static _Alignas(64) unsigned char memory[MEMORY];
+static size_t used;
+static float pixels[COLUMNS * ROWS];
+
+static void *take(size_t bytes)
+{
+    void *place = memory + used;
+    if (bytes > sizeof memory - used) {
+        board_print("out of memory\n");
+        board_end(1);
+    }
+    used += (bytes + 63) / 64 * 64;
+    return place;
+}
+
+static void require(int32_t status)
+{
+    if (status != BLIK_OK) {
+        board_print(blik_status_text(status));
+        board_print("\n");
+        board_end(1);
+    }
+}
+
+static void number(uint32_t value)
+{
+    char text[11];
+    char *at = text + sizeof text - 1;
+    *at = 0;
+    do {
+        *--at = (char)('0' + value % 10);
+        value /= 10;
+    } while (value != 0);
+    board_print(at);
+}
+
+static void say(const char *what, uint32_t value, const char *unit)
+{
+    board_print(what);
+    board_print(" ");
+    number(value);
+    board_print(unit);
+}
+
+/* FNV-1a */
+static uint32_t checksum(const void *data, size_t bytes)
+{
+    const unsigned char *at = (const unsigned char *)data, *end = at + bytes;
+    uint32_t sum = 2166136261U;
+    while (at != end) {
+        sum = (sum ^ *at++) * 16777619U;
+    }
+    return sum;
+}
+
+static void light(const blik_coupling *coupling, double toward, const blik_solution **solution)
+{
+    blik_error error;
+    blik_sky sky;
+    blik_sun sun;
+    blik_light light;
+    size_t bytes = 0;
+    void *place;
+    blik_sky_init(&sky);
+    sky.model = BLIK_SKY_OVERCAST;
+    blik_sun_init(&sun);
+    sun.direction[0] = toward;
+    sun.direction[1] = 1;
+    sun.direction[2] = 2;
+    blik_light_init(&light);
+    light.sky = &sky;
+    light.sun = &sun;
+    require(blik_solution_size(coupling, &light, &error, &bytes));
+    place = take(bytes);
+    require(blik_solution_init(coupling, &light, NULL, place, bytes, &error, solution));
+}
+
+static void show(const char *what, const blik_solution *solution)
+{
+    blik_error error;
+    blik_camera camera;
+    size_t bytes = 0, before = used;
+    void *scratch;
+    blik_camera_init(&camera);
+    camera.eye[0] = 4;
+    camera.eye[1] = -6;
+    camera.eye[2] = 5;
+    camera.height = 4.5;
+    camera.columns = COLUMNS;
+    camera.rows = ROWS;
+    require(blik_image_scratch_size(solution, &camera, NULL, &error, &bytes));
+    scratch = take(bytes);
+    require(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, COLUMNS * ROWS, NULL, NULL));
+    used = before;
+    say(what, checksum(pixels, sizeof pixels), "\n");
+}
+
+#ifndef RENDER_ONLY
+/* A spindle of eight sides along x, two wings and a fin; each wing and the fin is a flat tetrahedron. */
+static const float vertices[][3] = {
+    {3, 0, 0},         {1, .5F, 0},        {1, .354F, .354F},   {1, 0, .5F},        {1, -.354F, .354F},
+    {1, -.5F, 0},      {1, -.354F, -.354F}, {1, 0, -.5F},       {1, .354F, -.354F}, {-2, .4F, 0},
+    {-2, .283F, .283F}, {-2, 0, .4F},      {-2, -.283F, .283F}, {-2, -.4F, 0},      {-2, -.283F, -.283F},
+    {-2, 0, -.4F},     {-2, .283F, -.283F}, {-2.5F, 0, 0},      {.6F, .45F, .05F},  {-1.4F, .4F, .05F},
+    {-1.2F, 2.6F, .1F}, {-.4F, .45F, -.1F}, {.6F, -.45F, .05F}, {-1.4F, -.4F, .05F}, {-1.2F, -2.6F, .1F},
+    {-.4F, -.45F, -.1F}, {-1, .05F, .42F}, {-2, .05F, .35F},    {-2.1F, 0, 1.5F},   {-1.6F, -.08F, .38F}};
+static const unsigned char craft[][3] = {
+    {0, 1, 2},    {0, 2, 3},    {0, 3, 4},    {0, 4, 5},    {0, 5, 6},    {0, 6, 7},    {0, 7, 8},    {0, 8, 1},
+    {1, 9, 10},   {1, 10, 2},   {2, 10, 11},  {2, 11, 3},   {3, 11, 12},  {3, 12, 4},   {4, 12, 13},  {4, 13, 5},
+    {5, 13, 14},  {5, 14, 6},   {6, 14, 15},  {6, 15, 7},   {7, 15, 16},  {7, 16, 8},   {8, 16, 9},   {8, 9, 1},
+    {17, 10, 9},  {17, 11, 10}, {17, 12, 11}, {17, 13, 12}, {17, 14, 13}, {17, 15, 14}, {17, 16, 15}, {17, 9, 16},
+    {18, 20, 19}, {18, 21, 20}, {19, 20, 21}, {18, 19, 21}, {22, 23, 24}, {22, 24, 25}, {23, 25, 24}, {22, 25, 23},
+    {26, 27, 28}, {26, 28, 29}, {27, 29, 28}, {26, 29, 27}};
+enum { FACETS = sizeof craft / sizeof *craft, BODY = 32 };
+
+static void picture(void)
+{
+    size_t row, column;
+    for (row = 0; row < ROWS; ++row) {
+        char line[COLUMNS + 2];
+        for (column = 0; column < COLUMNS; ++column) {
+            const float level = pixels[row * COLUMNS + column] * 8;
+            line[column] = " .:-=+*#%@"[level < 9 ? (int)level : 9];
+        }
+        line[COLUMNS] = '\n';
+        line[COLUMNS + 1] = 0;
+        board_print(line);
+    }
+}
+
+/* From facets to a coupling, to an image, to a block; its size in `bytes`. */
+static const void *compute(size_t *bytes)
+{
+    static const double grey = .4, dark = .1, shine = .5, some = .2;
+    static const unsigned char finish[FACETS] = {[BODY] = 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2};
+    blik_material materials[3] = {{0}};
+    uint16_t facets[FACETS][3];
+    blik_error error;
+    blik_mesh mesh;
+    blik_settings settings;
+    const blik_scene *scene = NULL;
+    const blik_coupling *coupling = NULL;
+    const blik_solution *solution = NULL;
+    void *place;
+    size_t i, before;
+    materials[0].diffuse = &grey;
+    materials[1].diffuse = &dark;
+    materials[1].specular = &shine;
+    materials[2].diffuse = &grey;
+    materials[2].specular = &some;
+    materials[2].gloss_axis_ratio = 10;
+    materials[2].gloss_rays = 3;
+    for (i = 0; i < FACETS * 3; ++i) {
+        facets[i / 3][i % 3] = craft[i / 3][i % 3];
+    }
+    blik_mesh_init(&mesh);
+    mesh.vertices.data = vertices;
+    mesh.vertices.count = sizeof vertices / sizeof *vertices;
+    mesh.vertices.format = BLIK_F32;
+    mesh.facets.data = facets;
+    mesh.facets.count = FACETS;
+    mesh.facets.format = BLIK_U16;
+    mesh.facet_materials.data = finish;
+    mesh.facet_materials.count = FACETS;
+    mesh.facet_materials.format = BLIK_U8;
+    mesh.materials = materials;
+    mesh.material_count = 3;
+    require(blik_scene_size(&mesh, &error, bytes));
+    place = take(*bytes);
+    require(blik_scene_init(&mesh, place, *bytes, &error, &scene));
+
+    blik_settings_init(&settings);
+    settings.tolerance = 0.05;
+    /* all that is left; what it does not take goes back */
+    *bytes = sizeof memory - used;
+    place = take(*bytes);
+    require(blik_coupling_init(scene, &settings, NULL, place, *bytes, &error, &coupling));
+    {
+        blik_coupling_info info;
+        require(blik_coupling_get_info(coupling, &error, &info));
+        used -= (*bytes - info.bytes) / 64 * 64;
+        say("coupling", (uint32_t)info.pairs, " form factors\n");
+    }
+    require(blik_bake_size(coupling, NULL, &error, bytes));
+    place = take(*bytes);
+    require(blik_bake(coupling, NULL, place, *bytes, &error));
+    say("block of", (uint32_t)*bytes, " bytes\n");
+    say("block", checksum(place, *bytes), "\n");
+    before = used;
+    light(coupling, 1, &solution);
+    say("computed in", (uint32_t)used, " bytes\n");
+    show("image", solution);
+    picture();
+    used = before;
+    return place;
+}
+#endif
+
+/* An image from a baked block, under another sun. */
+static void render(const char *what, const void *block, size_t size)
+{
+    blik_error error;
+    const blik_scene *scene = NULL;
+    const blik_coupling *coupling = NULL;
+    const blik_solution *solution = NULL;
+    size_t bytes = 0, before = used;
+    void *place;
+    require(blik_load_size(block, size, &error, &bytes));
+    place = take(bytes);
+    require(blik_load(block, size, place, bytes, &error, &scene, &coupling, &solution));
+    light(coupling, -1, &solution);
+    say("rendered in", (uint32_t)(used - before), " bytes\n");
+    show(what, solution);
+    used = before;
+}
+
+/* How deep the stack gets, on machines that tell where theirs ends: what was painted before and is not any more. */
+static void stack(int paint)
+{
+    unsigned char here;
+    unsigned char *at = board_stack;
+    if (at == NULL) {
+        return;
+    }
+    if (paint) {
+        /* what is near `here` is this call's own */
+        while ((uintptr_t)at + 256 < (uintptr_t)&here) {
+            *at++ = PAINT;
+        }
+        return;
+    }
+    while (*at == PAINT) {
+        ++at;
+    }
+    say("stack", (uint32_t)((uintptr_t)&here - (uintptr_t)at), " bytes\n");
+}
+
+static void whole(void)
+{
+#ifndef RENDER_ONLY
+    size_t size = 0;
+    const void *own = compute(&size);
+    board_block = board_block != NULL ? board_block : own;
+    board_block_size = board_block_size != 0 ? board_block_size : size;
+    render("image of its block", own, size);
+    board_keep(own, size);
+#endif
+    render("image of baked block", board_block, board_block_size);
+}
+
+int main(void)
+{
+    stack(1);
+    whole();
+    stack(0);
+    board_print("done\n");
+    board_end(0);
+    return 0;
+}
