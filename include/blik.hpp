@@ -24,8 +24,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
+#include <functional>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -122,15 +125,15 @@ blik_array array(const C &container, std::size_t width) {
     return blik_array{container.data(), count, width * sizeof(number), format<number>()};
 }
 
-inline void run_on_threads(void *, std::size_t count, blik_task task, void *context) {
+inline void run_on_threads(void *, std::size_t count, blik_task task, void *context) noexcept {
     std::vector<std::thread> threads;
-    threads.reserve(count);
     try {
+        threads.reserve(count);
         for (std::size_t i = 1; i < count; ++i) {
             threads.emplace_back(task, context, i);
         }
     } catch (...) {
-        // no more threads: the first one takes all work that is left
+        // no more threads, or no memory for them: the first one takes all work that is left
     }
     task(context, 0);
     for (std::thread &thread : threads) {
@@ -205,6 +208,43 @@ inline blik_run threads(unsigned count = 0) {
     run.parallel = detail::run_on_threads;
     return run;
 }
+
+/* Tells the share of a stage that is done to `told`, which returns whether to go on; where it returns false or throws,
+ * the stage ends with BLIK_ERROR_CANCELLED. No exception passes through the library: rethrow() throws what was thrown.
+ *
+ *     blik::progress progress([&](double done) { return !window.closed(done); });
+ *     blik::coupling coupling(scene, blik::settings(), progress.on(blik::threads()));
+ */
+class progress {
+public:
+    explicit progress(std::function<bool(double)> told) : told_(std::move(told)) {}
+    progress(const progress &) = delete;
+    progress &operator=(const progress &) = delete;
+    /* `run` with this progress, which must outlive its use. */
+    blik_run on(blik_run run = alone()) noexcept {
+        run.progress = call;
+        run.progress_user = this;
+        return run;
+    }
+    void rethrow() {
+        if (thrown_) {
+            std::rethrow_exception(std::exchange(thrown_, nullptr));
+        }
+    }
+
+private:
+    static int32_t call(void *user, double done) noexcept {
+        progress &self = *static_cast<progress *>(user);
+        try {
+            return self.told_(done) ? 0 : 1;
+        } catch (...) {
+            self.thrown_ = std::current_exception();
+            return 1;
+        }
+    }
+    std::function<bool(double)> told_;
+    std::exception_ptr thrown_;
+};
 
 /* blik_settings with its defaults. */
 inline blik_settings settings(double tolerance = 2e-3) {
@@ -384,8 +424,18 @@ public:
         blik_error info{};
         check(blik_closest_hits(get(), rays.data(), rays.size(), &run, &info, hits.data()), info);
     }
+    /* Whether each ray meets any facet: 1 or 0. */
+    void any_hits(view<const blik_ray> rays, view<uint8_t> hits, const blik_run &run = alone()) const {
+        if (rays.size() != hits.size()) {
+            throw std::invalid_argument("blik: one hit per ray");
+        }
+        blik_error info{};
+        check(blik_any_hits(get(), rays.data(), rays.size(), &run, &info, hits.data()), info);
+    }
 
 private:
+    friend class loaded;
+    explicit scene(const blik_scene *handle) { owner_.handle_ = const_cast<blik_scene *>(handle); }
     detail::owner<blik_scene> owner_;
 };
 
@@ -416,6 +466,10 @@ public:
     }
 
 private:
+    friend class loaded;
+    coupling(const blik_coupling *handle, std::size_t bands) : bands_(bands) {
+        owner_.handle_ = const_cast<blik_coupling *>(handle);
+    }
     detail::owner<blik_coupling> owner_;
     std::size_t bands_ = 0;
 };
@@ -429,6 +483,11 @@ struct image {
     float at(std::size_t row, std::size_t column, std::size_t band = 0) const {
         return pixels.at((row * columns + column) * bands + band);
     }
+};
+
+/* What arrives at facets and leaves them: one value per facet, side and band, bands innermost. */
+struct facets {
+    std::vector<double> areas, irradiance, radiance;
 };
 
 /* A scene under one light, solved; its coupling must outlive it. */
@@ -492,10 +551,92 @@ public:
         check(blik_signatures(get(), first, directions.size(), cells, &run, &info, out.data()), info);
         return out;
     }
+    /* Radiance against each ray, one value per band. */
+    std::vector<double> radiance(view<const blik_ray> rays, const blik_run &run = alone()) const {
+        std::vector<double> out(rays.size() * bands_);
+        blik_error info{};
+        check(blik_radiance(get(), rays.data(), rays.size(), &run, &info, out.data()), info);
+        return out;
+    }
+    /* All facets of the scene that it was made of. */
+    blik::facets facets(const blik::scene &scene) const {
+        const blik_scene_info all = scene.info();
+        const std::size_t values = all.facets * all.sides * all.bands;
+        blik::facets out{std::vector<double>(all.facets), std::vector<double>(values), std::vector<double>(values)};
+        blik_error info{};
+        check(blik_facets(get(), 0, all.facets, &info, out.areas.data(), out.irradiance.data(), out.radiance.data()),
+              info);
+        return out;
+    }
+    /* The radiance per band to which errors are related. */
+    std::vector<double> reference() const {
+        std::vector<double> out(bands_);
+        blik_error info{};
+        check(blik_solution_get_reference(get(), &info, out.data()), info);
+        return out;
+    }
 
 private:
+    friend class loaded;
+    solution(const blik_solution *handle, std::size_t bands) : bands_(bands) {
+        owner_.handle_ = const_cast<blik_solution *>(handle);
+    }
     detail::owner<blik_solution> owner_;
     std::size_t bands_ = 0;
+};
+
+/* Scene, coupling and perhaps a solution as one relocatable block, on the boundary that it needs. */
+class block {
+public:
+    explicit block(const coupling &coupling) : block(coupling.get(), nullptr) {}
+    block(const coupling &coupling, const solution &solution) : block(coupling.get(), solution.get()) {}
+    const unsigned char *data() const noexcept { return start_; }
+    std::size_t size() const noexcept { return size_; }
+
+private:
+    block(const blik_coupling *coupling, const blik_solution *solution) {
+        blik_error info{};
+        check(blik_bake_size(coupling, solution, &info, &size_), info);
+        std::size_t room = size_ + BLIK_BLOCK_ALIGNMENT;
+        memory_.reset(new unsigned char[room]);
+        void *start = memory_.get();
+        start_ = static_cast<unsigned char *>(std::align(BLIK_BLOCK_ALIGNMENT, size_, start, room));
+        check(blik_bake(coupling, solution, start_, size_, &info), info);
+    }
+    std::unique_ptr<unsigned char[]> memory_;
+    unsigned char *start_ = nullptr;
+    std::size_t size_ = 0;
+};
+
+/* What a baked block holds, read where it stands: the block must outlive it. */
+class loaded {
+public:
+    explicit loaded(view<const unsigned char> block) {
+        blik_error info{};
+        std::size_t bytes = 0;
+        check(blik_load_size(block.data(), block.size(), &info, &bytes), info);
+        memory_.reset(new unsigned char[bytes]);
+        const blik_scene *scene = nullptr;
+        const blik_coupling *coupling = nullptr;
+        const blik_solution *solution = nullptr;
+        check(blik_load(block.data(), block.size(), memory_.get(), bytes, &info, &scene, &coupling, &solution), info);
+        scene_.emplace(blik::scene(scene));
+        const std::size_t bands = scene_->info().bands;
+        coupling_.emplace(blik::coupling(coupling, bands));
+        if (solution != nullptr) {
+            solution_.emplace(blik::solution(solution, bands));
+        }
+    }
+    const blik::scene &scene() const noexcept { return *scene_; }
+    const blik::coupling &coupling() const noexcept { return *coupling_; }
+    /* Null where the block has none. */
+    const blik::solution *solution() const noexcept { return solution_ ? &*solution_ : nullptr; }
+
+private:
+    std::unique_ptr<unsigned char[]> memory_;
+    std::optional<blik::scene> scene_;
+    std::optional<blik::coupling> coupling_;
+    std::optional<blik::solution> solution_;
 };
 
 } // namespace blik

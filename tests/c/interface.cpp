@@ -1,8 +1,10 @@
 // The C++ header: moves, exceptions, threads, containers. Exit 0 when all is as stated; compiled as C++17 to C++23.
 #include <blik.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <thread>
 #include <vector>
 
 #define REQUIRE(condition)                                                        \
@@ -61,7 +63,68 @@ int main() {
     scene.closest_hits(rays, hits);
     REQUIRE(hits[0].t == 2.0 && hits[0].facet < 2 && hits[0].front == 1);
 
+    std::vector<uint8_t> any(1);
+    scene.any_hits(rays, any);
+    REQUIRE(any[0] == 1);
+    const std::vector<double> seen = solution.radiance(rays);
+    const blik::facets values = solution.facets(scene);
+    REQUIRE(seen.size() == 2 && seen[0] > 0 && solution.reference().size() == 2);
+    REQUIRE(values.areas[0] == 0.5 && values.radiance.size() == 8 && values.radiance[0] > 0);
+
+    // baked, moved elsewhere, read again: the same bits; and lit anew
+    const blik::block block(coupling, solution), unsolved(coupling);
+    std::vector<unsigned char> kept(block.size() + 64);
+    unsigned char *place = kept.data() + (64 - reinterpret_cast<std::uintptr_t>(kept.data()) % 64) % 64;
+    std::copy(block.data(), block.data() + block.size(), place);
+    blik::loaded loaded(blik::view<const unsigned char>(place, block.size()));
+    const blik::loaded moved(std::move(loaded));
+    REQUIRE(moved.solution() != nullptr && moved.solution()->image(camera).pixels == solution.image(camera).pixels);
+    const blik::light sun(sky, blik::sun({1, 0, 1}));
+    REQUIRE(blik::solution(moved.coupling(), sun).image(camera).pixels == alone.pixels);
+    REQUIRE(blik::loaded(unsolved).solution() == nullptr && moved.scene().info().facets == 4);
+
+    // many threads at the same objects at once
+    std::vector<int> same(4, 0);
+    std::vector<std::thread> threads;
+    for (int &equal : same) {
+        threads.emplace_back([&] {
+            const blik::solution own(moved.coupling(), sun, blik::threads(2));
+            equal = own.image(camera).pixels == alone.pixels && solution.radiance(rays) == seen;
+        });
+    }
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+    REQUIRE(same == std::vector<int>(4, 1));
+
+    // an exception of a callback stops the stage and comes out where the caller asks for it
     int caught = 0;
+    blik::progress throwing([](double) -> bool { throw std::range_error("mine"); });
+    try {
+        const blik::coupling never(scene, blik::settings(2e-2), throwing.on(blik::threads(2)));
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_CANCELLED;
+    }
+    try {
+        throwing.rethrow();
+    } catch (const std::range_error &) {
+        caught += 1;
+    }
+    REQUIRE(caught == 2);
+    double last = 0;
+    blik::progress telling([&](double done) { return (last = done) <= 1.0; });
+    const blik::coupling told(scene, blik::settings(2e-2), telling.on());
+    REQUIRE(last == 1.0 && told.info().pairs == coupling.info().pairs);
+
+    caught = 0;
+    try {
+        kept[kept.size() / 2] ^= 1;
+        const blik::loaded damaged(blik::view<const unsigned char>(place, block.size()));
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_BLOCK;
+    }
+    REQUIRE(caught == 1);
+    caught = 0;
     try {
         blik::coupling(scene, blik::settings(0.5));
     } catch (const blik::error &error) {
