@@ -615,6 +615,61 @@ typedef struct blik_coupling_info {
 } blik_coupling_info;
 
 /**
+ * A ray for blik_closest_hits and blik_any_hits, in the mesh's coordinates.
+ */
+typedef struct blik_ray {
+    /**
+     * Where it starts.
+     */
+    double origin[3];
+    /**
+     * Unit vector along it.
+     */
+    double direction[3];
+    /**
+     * Hits at this distance and beyond do not count; infinity for no limit.
+     */
+    double t_max;
+    /**
+     * Index of the facet that it leaves and never hits; `BLIK_NO_FACET` for none.
+     */
+    uint32_t skip;
+} blik_ray;
+
+/**
+ * Finds the first facet that each of `count` rays meets: their indices, or `BLIK_NO_FACET`, to `facets`. The facet
+ * `skip` of a ray and what lies at `t_max` or beyond do not count. Called by any number of threads at once.
+ */
+typedef void (*blik_first_facets)(void *user, const struct blik_ray *rays, size_t count, uint32_t *facets);
+
+/**
+ * Finds whether each of `count` rays meets any facet, as blik_first_facets does: not 0 or 0, to `hits`.
+ */
+typedef void (*blik_any_facets)(void *user, const struct blik_ray *rays, size_t count, uint8_t *hits);
+
+/**
+ * A ray tracer of the caller's over the mesh of a scene. Set by blik_intersector_init first.
+ */
+typedef struct blik_intersector {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * Finds first facets; must not be null.
+     */
+    blik_first_facets first_facets;
+    /**
+     * Finds whether there is any; null (default): by `first_facets`.
+     */
+    blik_any_facets any_facets;
+    /**
+     * Handed to both.
+     */
+    void *user;
+} blik_intersector;
+
+/**
  * What was done on rows of an image; tallies of all its rows add up by blik_tally_add.
  */
 typedef struct blik_tally {
@@ -850,28 +905,6 @@ typedef struct blik_scene_info {
      */
     size_t bytes;
 } blik_scene_info;
-
-/**
- * A ray for blik_closest_hits and blik_any_hits, in the mesh's coordinates.
- */
-typedef struct blik_ray {
-    /**
-     * Where it starts.
-     */
-    double origin[3];
-    /**
-     * Unit vector along it.
-     */
-    double direction[3];
-    /**
-     * Hits at this distance and beyond do not count; infinity for no limit.
-     */
-    double t_max;
-    /**
-     * Index of the facet that it leaves and never hits; `BLIK_NO_FACET` for none.
-     */
-    uint32_t skip;
-} blik_ray;
 
 /**
  * Where a ray meets the mesh first.
@@ -1226,6 +1259,23 @@ int32_t blik_gloss(double gloss_axis_ratio,
                    struct blik_error *error,
                    double *albedo,
                    double *value);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_intersector_init(struct blik_intersector *intersector);
+
+/**
+ * Has rays traced by the caller's tracer, or, with a null pointer, by the library again. To be called while nobody else
+ * uses the scene, which keeps a copy; its functions must not throw and are in use as long as the scene.
+ *
+ * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
+ * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
+ * Rays may come in any number at once (at present: one).
+ */
+int32_t blik_scene_set_intersector(const struct blik_scene *scene,
+                                   const struct blik_intersector *intersector,
+                                   struct blik_error *error);
 
 /**
  * The report of an image from the tally of all its rows; reads the whole coupling.

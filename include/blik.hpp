@@ -424,6 +424,11 @@ public:
         blik_error info{};
         check(blik_closest_hits(get(), rays.data(), rays.size(), &run, &info, hits.data()), info);
     }
+    /* Has rays traced by the caller's tracer, whose functions must not throw; nobody else may use the scene meanwhile. */
+    void set_intersector(const blik_intersector &intersector) {
+        blik_error info{};
+        check(blik_scene_set_intersector(get(), &intersector, &info), info);
+    }
     /* Whether each ray meets any facet: 1 or 0. */
     void any_hits(view<const blik_ray> rays, view<uint8_t> hits, const blik_run &run = alone()) const {
         if (rays.size() != hits.size()) {

@@ -9,6 +9,7 @@
 mod bake;
 mod coupling;
 mod form_factor;
+mod intersector;
 mod memory;
 mod mesh;
 mod report;
@@ -22,6 +23,9 @@ mod view;
 pub use bake::*;
 pub use coupling::*;
 pub use form_factor::*;
+pub use intersector::{
+    blik_any_facets, blik_first_facets, blik_intersector, blik_intersector_init, blik_scene_set_intersector,
+};
 pub use report::*;
 #[cfg(feature = "std")]
 pub use run::blik_run_on_threads;

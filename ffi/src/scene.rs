@@ -1,5 +1,6 @@
 //! The scene: a checked mesh with its materials, ready for rays.
 
+use crate::intersector::Caller;
 use crate::memory::*;
 use crate::mesh::Reader;
 use crate::run::{Runner, blik_run};
@@ -18,6 +19,7 @@ pub struct blik_scene {
     tag: usize,
     pub(crate) scene: Scene<'static>,
     pub(crate) bvh: Bvh<'static>,
+    pub(crate) tracer: Option<Caller>,
     #[cfg(feature = "std")]
     owner: Option<std::boxed::Box<Owned>>,
 }
@@ -42,6 +44,7 @@ impl blik_scene {
             tag: blik_scene::TAG,
             scene,
             bvh,
+            tracer: None,
             #[cfg(feature = "std")]
             owner: None,
         }

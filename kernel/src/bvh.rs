@@ -8,6 +8,7 @@ mod above;
 mod bake;
 mod build;
 mod collapse;
+mod external;
 #[cfg(feature = "std")]
 mod obvhs;
 mod traverse;
@@ -19,6 +20,9 @@ use crate::ray::{self, Hit, Ray};
 use crate::simd::Isa;
 
 use build::{Binary, Facets};
+use external::External;
+
+pub use external::Intersector;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.
@@ -65,6 +69,7 @@ pub struct Bvh<'m> {
     /// Largest magnitude of a coordinate.
     scale: f64,
     isa: Isa,
+    external: Option<External<'m>>,
 }
 
 /// How many of each thing `facets` facets can need.
@@ -170,17 +175,42 @@ impl<'m> Bvh<'m> {
         }
         let (boxes, _) = boxes.split_at(made.nodes.min(boxes.len()));
         let (children, _) = children.split_at(boxes.len());
-        Ok(Bvh { boxes, children, packets, facets, levels: made.levels, low, high, scale, isa })
+        Ok(Bvh {
+            boxes,
+            children,
+            packets,
+            facets,
+            levels: made.levels,
+            low,
+            high,
+            scale,
+            isa,
+            external: None,
+        })
+    }
+
+    /// The same with a tracer of the caller's in place of the walk through the tree; `corners` are the mesh's. Where
+    /// an answer names a facet that the ray does not meet, the tree is asked.
+    pub fn with_intersector(self, tracer: Option<&'m dyn Intersector>, corners: &'m [[Vec3; 3]]) -> Bvh<'m> {
+        Bvh { external: tracer.map(|tracer| External { tracer, corners }), ..self }
     }
 
     /// The first facet that the ray meets: least t with `0 < t < t_max`, then lowest index.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        if let Some(external) = &self.external
+            && let Ok(hit) = external.closest(ray)
+        {
+            return hit;
+        }
         traverse::closest(self, ray)
     }
 
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        traverse::occluded(self, ray)
+        match &self.external {
+            Some(external) => external.tracer.any(ray),
+            None => traverse::occluded(self, ray),
+        }
     }
 
     /// Whether any corner of a facet that rays can meet lies above the plane of points p with p.normal = height.

@@ -284,6 +284,11 @@ impl<'m> Scene<'m> {
         (point - self.lowest - self.half) * self.scale
     }
 
+    /// A point of scene coordinates in the caller's.
+    pub fn to_caller(&self, point: Vec3) -> Vec3 {
+        point / self.scale + self.half + self.lowest
+    }
+
     /// Scene lengths per length of the caller: a power of two.
     pub fn scale(&self) -> f64 {
         self.scale

@@ -2,6 +2,7 @@
 #include <blik.hpp>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <thread>
@@ -82,6 +83,43 @@ int main() {
     const blik::light sun(sky, blik::sun({1, 0, 1}));
     REQUIRE(blik::solution(moved.coupling(), sun).image(camera).pixels == alone.pixels);
     REQUIRE(blik::loaded(unsolved).solution() == nullptr && moved.scene().info().facets == 4);
+
+    // rays traced by somebody else: another scene's tree, and one whose answers are all wrong
+    struct tracer {
+        blik::scene scene;
+        bool right;
+        std::atomic<std::size_t> calls{0};
+    };
+    const auto first_facets = [](void *user, const blik_ray *sent, std::size_t count, uint32_t *found) {
+        tracer &self = *static_cast<tracer *>(user);
+        self.calls += count;
+        for (std::size_t i = 0; i < count; ++i) {
+            blik_hit hit;
+            hit.facet = 3;
+            if (self.right && blik_closest_hits(self.scene.get(), sent + i, 1, nullptr, nullptr, &hit) != BLIK_OK) {
+                std::abort();
+            }
+            found[i] = self.right || i % 2 == 0 ? hit.facet : 1000;
+        }
+    };
+    const auto any_facets = [](void *user, const blik_ray *sent, std::size_t count, uint8_t *found) {
+        if (blik_any_hits(static_cast<tracer *>(user)->scene.get(), sent, count, nullptr, nullptr, found) != BLIK_OK) {
+            std::abort();
+        }
+    };
+    for (const bool right : {true, false}) {
+        tracer other{blik::scene(mesh), right};
+        blik_intersector intersector;
+        blik_intersector_init(&intersector);
+        intersector.first_facets = first_facets;
+        intersector.any_facets = any_facets;
+        intersector.user = &other;
+        blik::scene traced(mesh);
+        traced.set_intersector(intersector);
+        const blik::coupling own(traced, blik::settings(2e-2), blik::threads(2));
+        REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.calls > 1000);
+    }
+    REQUIRE(blik_scene_set_intersector(scene.get(), nullptr, nullptr) == BLIK_OK);
 
     // many threads at the same objects at once
     std::vector<int> same(4, 0);

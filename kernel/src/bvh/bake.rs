@@ -44,6 +44,7 @@ impl<'m> Bvh<'m> {
             high,
             scale: low.abs().max(high.abs()).max_element(),
             isa,
+            external: None,
         };
         bvh.levels = bvh.sound_levels().ok_or(Error::Block)?;
         if bvh.packets_sound(scene) { Ok(bvh) } else { Err(Error::Block) }

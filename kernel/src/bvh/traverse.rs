@@ -26,30 +26,38 @@ const SHORT: usize = 64;
 
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<false> { bvh, ray })
+    if bvh.levels * 7 < SHORT { search::<false, SHORT>(bvh, ray) } else { deep::<false>(bvh, ray) }
 }
 
 /// See [`Bvh::occluded`].
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
-    simd::run_lanes(bvh.isa, Search::<true> { bvh, ray }).is_some()
+    let hit = if bvh.levels * 7 < SHORT { search::<true, SHORT>(bvh, ray) } else { deep::<true>(bvh, ray) };
+    hit.is_some()
+}
+
+#[inline(always)]
+fn search<const ANY: bool, const N: usize>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+    simd::run_lanes(bvh.isa, Search::<ANY, N> { bvh, ray })
+}
+
+/// Apart, so that only who has a deep tree pays for the long stack.
+#[inline(never)]
+fn deep<const ANY: bool>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+    search::<ANY, STACK>(bvh, ray)
 }
 
 /// The search for the first hit, or for any.
-struct Search<'a, const ANY: bool> {
+struct Search<'a, const ANY: bool, const N: usize> {
     bvh: &'a Bvh<'a>,
     ray: &'a Ray,
 }
 
-impl<const ANY: bool> LaneTask for Search<'_, ANY> {
+impl<const ANY: bool, const N: usize> LaneTask for Search<'_, ANY, N> {
     type Out = Option<Hit>;
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        if self.bvh.levels * 7 < SHORT {
-            Walk::new(self.bvh, self.ray)?.search::<L, ANY, SHORT>(lanes)
-        } else {
-            Walk::new(self.bvh, self.ray)?.search::<L, ANY, STACK>(lanes)
-        }
+        Walk::new(self.bvh, self.ray)?.search::<L, ANY, N>(lanes)
     }
 }
 

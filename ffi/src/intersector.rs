@@ -1,0 +1,130 @@
+//! A ray tracer of the caller's behind a scene.
+
+use crate::call;
+use crate::memory::*;
+use crate::scene::{blik_ray, blik_scene};
+use crate::status::*;
+use crate::types::{Sized_, read, sized};
+use blik_kernel::bvh::Intersector;
+use blik_kernel::ray::Ray;
+use blik_kernel::scene::Scene;
+use core::ffi::c_void;
+use core::ptr::null_mut;
+
+/// Finds the first facet that each of `count` rays meets: their indices, or `BLIK_NO_FACET`, to `facets`. The facet
+/// `skip` of a ray and what lies at `t_max` or beyond do not count. Called by any number of threads at once.
+pub type blik_first_facets =
+    Option<unsafe extern "C" fn(user: *mut c_void, rays: *const blik_ray, count: usize, facets: *mut u32)>;
+
+/// Finds whether each of `count` rays meets any facet, as blik_first_facets does: not 0 or 0, to `hits`.
+pub type blik_any_facets =
+    Option<unsafe extern "C" fn(user: *mut c_void, rays: *const blik_ray, count: usize, hits: *mut u8)>;
+
+/// A ray tracer of the caller's over the mesh of a scene. Set by [`blik_intersector_init`] first.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_intersector {
+    /// Set by the init function.
+    pub struct_size: usize,
+    /// Finds first facets; must not be null.
+    pub first_facets: blik_first_facets,
+    /// Finds whether there is any; null (default): by `first_facets`.
+    pub any_facets: blik_any_facets,
+    /// Handed to both.
+    pub user: *mut c_void,
+}
+sized!(blik_intersector);
+
+/// Sets the defaults; does nothing with a null pointer.
+///
+/// # Safety
+/// `intersector` points to memory for one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_intersector_init(intersector: *mut blik_intersector) {
+    let value = blik_intersector {
+        struct_size: size_of::<blik_intersector>(),
+        first_facets: None,
+        any_facets: None,
+        user: null_mut(),
+    };
+    if !intersector.is_null() && intersector.is_aligned() {
+        // SAFETY: by the caller's promise there is room for one.
+        unsafe { intersector.write(value) };
+    }
+}
+
+/// Has rays traced by the caller's tracer, or, with a null pointer, by the library again. To be called while nobody else
+/// uses the scene, which keeps a copy; its functions must not throw and are in use as long as the scene.
+///
+/// Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
+/// facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
+/// Rays may come in any number at once (at present: one).
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_scene_set_intersector(
+    scene: *const blik_scene,
+    intersector: *const blik_intersector,
+    error: *mut blik_error,
+) -> i32 {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let corners = unsafe { object(scene) }?.scene.corners();
+        let tracer = match intersector.is_null() {
+            true => None,
+            // SAFETY: by the caller's promise.
+            false => Some(unsafe { read(intersector) }?),
+        };
+        if tracer.is_some_and(|t| t.first_facets.is_none()) {
+            return Err(blik_error::of(BLIK_ERROR_NULL));
+        }
+        let at = scene.cast_mut();
+        // SAFETY: a handle, which nobody else uses now and which does not move as long as it is used.
+        unsafe {
+            (*at).tracer = tracer.map(|tracer| Caller { tracer, scene: (*at).scene });
+            let placed: Option<&'static Caller> = (*(&raw const (*at).tracer)).as_ref();
+            (*at).bvh = (*at).bvh.with_intersector(placed.map(|t| t as &dyn Intersector), corners);
+        }
+        Ok(())
+    })
+}
+
+/// The caller's tracer, in the mesh's coordinates.
+pub(crate) struct Caller {
+    tracer: blik_intersector,
+    scene: Scene<'static>,
+}
+
+// SAFETY: the caller promises functions that any number of threads may call at once.
+unsafe impl Sync for Caller {}
+
+impl Caller {
+    fn outside(&self, ray: &Ray) -> blik_ray {
+        blik_ray {
+            origin: self.scene.to_caller(ray.origin).to_array(),
+            direction: ray.direction.to_array(),
+            t_max: ray.t_max / self.scene.scale(),
+            skip: ray.skip,
+        }
+    }
+}
+
+impl Intersector for Caller {
+    fn first(&self, ray: &Ray) -> Option<u32> {
+        let (ray, mut facet) = (self.outside(ray), u32::MAX);
+        if let Some(find) = self.tracer.first_facets {
+            // SAFETY: the caller's function, with the caller's pointer.
+            unsafe { find(self.tracer.user, &raw const ray, 1, &raw mut facet) };
+        }
+        (facet != u32::MAX).then_some(facet)
+    }
+
+    fn any(&self, ray: &Ray) -> bool {
+        let Some(find) = self.tracer.any_facets else { return self.first(ray).is_some() };
+        let (ray, mut hit) = (self.outside(ray), 0);
+        // SAFETY: as above.
+        unsafe { find(self.tracer.user, &raw const ray, 1, &raw mut hit) };
+        hit != 0
+    }
+}
