@@ -54,7 +54,7 @@ fn text(output: &Output) -> String {
 }
 
 /// Compiles, links and runs a program; what it printed.
-fn run(compiler: &str, standard: &str, source: &Path, link: Link) -> String {
+fn run(compiler: &str, standard: &str, source: &Path, link: Link, arguments: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("program");
     let mut command = Command::new(compiler);
@@ -67,7 +67,7 @@ fn run(compiler: &str, standard: &str, source: &Path, link: Link) -> String {
     };
     let output = command.output().unwrap();
     assert!(output.status.success(), "{compiler} -std={standard}:\n{}", text(&output));
-    let output = Command::new(&program).env("LD_LIBRARY_PATH", library()).output().unwrap();
+    let output = Command::new(&program).args(arguments).env("LD_LIBRARY_PATH", library()).output().unwrap();
     assert!(output.status.success(), "{compiler} -std={standard}: {}", text(&output));
     String::from_utf8(output.stdout).unwrap()
 }
@@ -78,7 +78,7 @@ fn c_programs_run_as_every_standard() {
     for compiler in ["cc", "clang"] {
         for standard in ["c99", "c11", "c17", "c2x"].iter().filter(|s| knows(compiler, s)) {
             let link = if *standard == "c11" { Link::Shared } else { Link::Static };
-            assert_eq!(run(compiler, standard, &source, link), "ok\n");
+            assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
         }
     }
 }
@@ -89,7 +89,7 @@ fn cpp_programs_run_as_every_standard() {
     for compiler in ["c++", "clang++"] {
         for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
             let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
-            assert_eq!(run(compiler, standard, &source, link), "ok\n");
+            assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
         }
     }
 }
@@ -102,9 +102,35 @@ fn the_readme_shows_a_program_of_at_most_forty_lines_that_runs() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
     assert!(readme.contains(&format!("```cpp\n{program}```")), "README.md shows another program");
     if knows("c++", "c++17") {
-        let printed = run("c++", "c++17", &source, Link::Static);
+        let printed = run("c++", "c++17", &source, Link::Static, &[]);
         assert!(printed.lines().count() == 25 && printed.contains("error estimate"), "{printed}");
     }
+}
+
+#[test]
+fn the_examples_do_what_they_say() {
+    let examples = root().join("ffi/examples");
+    if knows("c++", "c++17") {
+        let table = run("c++", "c++17", &examples.join("light_curve.cpp"), Link::Shared, &["3"]);
+        let lines: Vec<&str> = table.lines().collect();
+        assert!(lines.len() == 4 && lines[0].starts_with("seconds,roll_deg,"), "{table}");
+        for line in &lines[1..] {
+            let values: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+            // about 12 square metres of wings and body, seen obliquely, under a sky of radiance 1 and a sun of pi
+            assert!(values.len() == 6 && values[3] > 0.05 && values[3] < 20.0, "{line}");
+            assert!(values[4] > 2.0 && values[4] < 8.0, "{line}");
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let pictures = ["1", "3"].map(|threads| {
+        let file = folder.path().join(threads);
+        let arguments = [file.to_str().unwrap(), threads];
+        let printed = run("cc", "c99", &examples.join("threaded.c"), Link::Shared, &arguments);
+        assert!(printed.contains("pixels of the craft"), "{printed}");
+        std::fs::read(file).unwrap()
+    });
+    assert_eq!(pictures[0].len(), 15 + 320 * 240);
+    assert!(pictures[0] == pictures[1], "the picture depends on the number of threads");
 }
 
 fn header() -> String {

@@ -83,8 +83,9 @@ pub unsafe extern "C" fn blik_scene_set_intersector(
         // SAFETY: a handle, which nobody else uses now and which does not move as long as it is used.
         unsafe {
             (*at).tracer = tracer.map(|tracer| Caller { tracer, scene: (*at).scene });
-            let placed: Option<&'static Caller> = (*(&raw const (*at).tracer)).as_ref();
-            (*at).bvh = (*at).bvh.with_intersector(placed.map(|t| t as &dyn Intersector), corners);
+            let placed: &'static Option<Caller> = &(*at).tracer;
+            let placed = placed.as_ref().map(|t| t as &dyn Intersector);
+            (*at).bvh = (*at).bvh.with_intersector(placed, corners);
         }
         Ok(())
     })

@@ -2,11 +2,15 @@
  * Blik without heap and operating system: a small craft from its facets to its image, and the same from a block that a
  * workstation baked. Everything stands in one static array; `board.h` is all that it needs of the machine.
  *
- * Compiled with RENDER_ONLY it reads the baked block alone. What it prints are checksums of the bits of its results: they are the same on every machine.
+ * Compiled with RENDER_ONLY it reads the baked block alone. What it prints are checksums of the bits of its results:
+ * they are the same on every machine.
  */
 #include "board.h"
 
 #include <blik.h>
+#ifndef RENDER_ONLY
+#include "../craft.h"
+#endif
 
 enum { COLUMNS = 24, ROWS = 16, MEMORY = 2048 * 1024, PAINT = 0x5a };
 
@@ -108,23 +112,6 @@ static void show(const char *what, const blik_solution *solution)
 }
 
 #ifndef RENDER_ONLY
-/* A spindle of eight sides along x, two wings and a fin; each wing and the fin is a flat tetrahedron. */
-static const float vertices[][3] = {
-    {3, 0, 0},         {1, .5F, 0},        {1, .354F, .354F},   {1, 0, .5F},        {1, -.354F, .354F},
-    {1, -.5F, 0},      {1, -.354F, -.354F}, {1, 0, -.5F},       {1, .354F, -.354F}, {-2, .4F, 0},
-    {-2, .283F, .283F}, {-2, 0, .4F},      {-2, -.283F, .283F}, {-2, -.4F, 0},      {-2, -.283F, -.283F},
-    {-2, 0, -.4F},     {-2, .283F, -.283F}, {-2.5F, 0, 0},      {.6F, .45F, .05F},  {-1.4F, .4F, .05F},
-    {-1.2F, 2.6F, .1F}, {-.4F, .45F, -.1F}, {.6F, -.45F, .05F}, {-1.4F, -.4F, .05F}, {-1.2F, -2.6F, .1F},
-    {-.4F, -.45F, -.1F}, {-1, .05F, .42F}, {-2, .05F, .35F},    {-2.1F, 0, 1.5F},   {-1.6F, -.08F, .38F}};
-static const unsigned char craft[][3] = {
-    {0, 1, 2},    {0, 2, 3},    {0, 3, 4},    {0, 4, 5},    {0, 5, 6},    {0, 6, 7},    {0, 7, 8},    {0, 8, 1},
-    {1, 9, 10},   {1, 10, 2},   {2, 10, 11},  {2, 11, 3},   {3, 11, 12},  {3, 12, 4},   {4, 12, 13},  {4, 13, 5},
-    {5, 13, 14},  {5, 14, 6},   {6, 14, 15},  {6, 15, 7},   {7, 15, 16},  {7, 16, 8},   {8, 16, 9},   {8, 9, 1},
-    {17, 10, 9},  {17, 11, 10}, {17, 12, 11}, {17, 13, 12}, {17, 14, 13}, {17, 15, 14}, {17, 16, 15}, {17, 9, 16},
-    {18, 20, 19}, {18, 21, 20}, {19, 20, 21}, {18, 19, 21}, {22, 23, 24}, {22, 24, 25}, {23, 25, 24}, {22, 25, 23},
-    {26, 27, 28}, {26, 28, 29}, {27, 29, 28}, {26, 29, 27}};
-enum { FACETS = sizeof craft / sizeof *craft, BODY = 32 };
-
 static void picture(void)
 {
     size_t row, column;
@@ -144,9 +131,7 @@ static void picture(void)
 static const void *compute(size_t *bytes)
 {
     static const double grey = .4, dark = .1, shine = .5, some = .2;
-    static const unsigned char finish[FACETS] = {[BODY] = 1, 1, 1, 1, 1, 1, 1, 1, 2, 2, 2, 2};
     blik_material materials[3] = {{0}};
-    uint16_t facets[FACETS][3];
     blik_error error;
     blik_mesh mesh;
     blik_settings settings;
@@ -154,7 +139,7 @@ static const void *compute(size_t *bytes)
     const blik_coupling *coupling = NULL;
     const blik_solution *solution = NULL;
     void *place;
-    size_t i, before;
+    size_t before;
     materials[0].diffuse = &grey;
     materials[1].diffuse = &dark;
     materials[1].specular = &shine;
@@ -162,18 +147,15 @@ static const void *compute(size_t *bytes)
     materials[2].specular = &some;
     materials[2].gloss_axis_ratio = 10;
     materials[2].gloss_rays = 3;
-    for (i = 0; i < FACETS * 3; ++i) {
-        facets[i / 3][i % 3] = craft[i / 3][i % 3];
-    }
     blik_mesh_init(&mesh);
-    mesh.vertices.data = vertices;
-    mesh.vertices.count = sizeof vertices / sizeof *vertices;
+    mesh.vertices.data = craft_vertices;
+    mesh.vertices.count = CRAFT_VERTICES;
     mesh.vertices.format = BLIK_F32;
-    mesh.facets.data = facets;
-    mesh.facets.count = FACETS;
+    mesh.facets.data = craft_facets;
+    mesh.facets.count = CRAFT_FACETS;
     mesh.facets.format = BLIK_U16;
-    mesh.facet_materials.data = finish;
-    mesh.facet_materials.count = FACETS;
+    mesh.facet_materials.data = craft_materials;
+    mesh.facet_materials.count = CRAFT_FACETS;
     mesh.facet_materials.format = BLIK_U8;
     mesh.materials = materials;
     mesh.material_count = 3;
