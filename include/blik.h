@@ -1501,7 +1501,7 @@ int32_t blik_radiance(const struct blik_solution *solution,
 /**
  * What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
  * from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
- * one ray each; 0: by tolerance. Views are shared out over the lanes of `run`.
+ * one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`.
  */
 int32_t blik_signatures(const struct blik_solution *solution,
                         const double *directions,

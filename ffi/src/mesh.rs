@@ -58,7 +58,29 @@ impl Reader {
             let error = blik_error::of(BLIK_ERROR_STRUCT_SIZE);
             return Err(error.sizes(size_of::<blik_material>(), mesh.material_stride));
         }
-        Ok(Reader(mesh))
+        match mesh.material_stride.checked_mul(mesh.material_count) {
+            Some(bytes) if bytes <= isize::MAX as usize => {}
+            _ => {
+                return Err(
+                    blik_error::of(BLIK_ERROR_TOO_MANY).sizes(isize::MAX as usize, mesh.material_count)
+                );
+            }
+        }
+        let mesh = Reader(mesh);
+        for index in 0..mesh.0.material_count {
+            let material = mesh.raw(index);
+            if ![material.diffuse, material.specular, material.emission].iter().all(|p| p.is_aligned()) {
+                return Err(blik_error { index, ..blik_error::of(BLIK_ERROR_ALIGNMENT) });
+            }
+        }
+        Ok(mesh)
+    }
+
+    /// A material as the caller keeps it.
+    fn raw(&self, index: usize) -> blik_material {
+        let at = self.0.materials.cast::<u8>().wrapping_add(index * self.0.material_stride);
+        // SAFETY: indices are below `material_count`, and the stride holds a material.
+        unsafe { at.cast::<blik_material>().read_unaligned() }
     }
 
     /// Number `at` of entry `index`.
@@ -131,9 +153,7 @@ impl Mesh for Reader {
     }
 
     fn material(&self, index: usize) -> MaterialInput<'_> {
-        let at = self.0.materials.cast::<u8>().wrapping_add(index * self.0.material_stride);
-        // SAFETY: the kernel asks for indices below `material_count`, and the stride holds a material.
-        let material = unsafe { at.cast::<blik_material>().read_unaligned() };
+        let material = self.raw(index);
         let bands = self.0.bands.min(MAX_BANDS);
         let values = |at: *const f64| {
             if at.is_null() {

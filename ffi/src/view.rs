@@ -396,9 +396,12 @@ pub struct blik_signature {
     pub contrast: f64,
 }
 
+/// Cells along a side of a view.
+const MOST_CELLS: usize = 65536;
+
 /// What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
 /// from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
-/// one ray each; 0: by tolerance. Views are shared out over the lanes of `run`.
+/// one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`.
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -423,6 +426,9 @@ pub unsafe extern "C" fn blik_signatures(
         let (directions, out) = unsafe { (input(directions, numbers)?, output(signatures, all)?) };
         let cells =
             if cells == 0 { policy::signature_cells(solution.coupling.settings.tolerance) } else { cells };
+        if cells > MOST_CELLS {
+            return Err(too_many.sizes(MOST_CELLS, cells));
+        }
         let out = Start(out.as_mut_ptr());
         let lanes = runner.lanes();
         runner.each(views, lanes, 1.0, &|_, view| {

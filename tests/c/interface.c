@@ -155,6 +155,15 @@ int main(void)
     REQUIRE(blik_solution_init(coupling, &light, NULL, blocks[2], bytes, &error, &solution) == BLIK_OK);
     check_facets(solution);
     check_image(solution);
+    {
+        static const double down[3] = {0, 0, -1};
+        blik_signature signature;
+        REQUIRE(blik_signatures(solution, down, 1, 65537, NULL, &error, &signature) == BLIK_ERROR_TOO_MANY);
+        REQUIRE(error.needed == 65536);
+        material.emission = (const double *)(const void *)((const char *)&one + 1);
+        REQUIRE(blik_scene_size(&mesh, &error, &bytes) == BLIK_ERROR_ALIGNMENT && error.index == 0);
+        material.emission = &one;
+    }
     free(blocks[2]);
     free(blocks[1]);
     free(blocks[0]);
