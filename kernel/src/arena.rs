@@ -102,13 +102,14 @@ impl<'m> Arena<'m> {
         let skip = self.rest.as_ptr().align_offset(ALIGNMENT);
         let needed = Need::new().and::<T>(count).bytes()?;
         let size = (needed - (ALIGNMENT - 1)).min(count.saturating_mul(size_of::<T>()));
+        let short = Error::BufferTooSmall { needed, given: self.rest.len() };
         let end = match skip.checked_add(size) {
             Some(end) if end <= self.rest.len() => end,
-            _ => return Err(Error::BufferTooSmall { needed, given: self.rest.len() }),
+            _ => return Err(short),
         };
-        let (head, tail) = core::mem::take(&mut self.rest).split_at_mut(end);
+        let (head, tail) = core::mem::take(&mut self.rest).split_at_mut_checked(end).ok_or(short)?;
         self.rest = tail;
-        let bytes = &mut head[skip..];
+        let (_, bytes) = head.split_at_mut_checked(skip).ok_or(short)?;
         bytes.fill(0);
         const { assert!(align_of::<T>() <= ALIGNMENT) };
         // SAFETY: `bytes` is a unique borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
@@ -134,12 +135,10 @@ impl<'m> View<'m> {
     pub fn take<T: Plain>(&mut self, count: usize) -> Result<&'m [T], Error> {
         let skip = self.rest.as_ptr().align_offset(ALIGNMENT);
         let size = count.saturating_mul(size_of::<T>());
-        let end = skip.saturating_add(size);
-        if end > self.rest.len() {
-            return Err(Error::BufferTooSmall { needed: end, given: self.rest.len() });
-        }
-        let bytes = &self.rest[skip..end];
-        self.rest = &self.rest[end..];
+        let short = Error::BufferTooSmall { needed: skip.saturating_add(size), given: self.rest.len() };
+        let (_, rest) = self.rest.split_at_checked(skip).ok_or(short)?;
+        let (bytes, rest) = rest.split_at_checked(size).ok_or(short)?;
+        self.rest = rest;
         const { assert!(align_of::<T>() <= ALIGNMENT) };
         // SAFETY: `bytes` is a shared borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
         // ALIGNMENT >= align_of::<T>() (checked above), and any bytes are a value of the plain type T.

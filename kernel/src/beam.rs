@@ -15,7 +15,7 @@ use crate::element::Elements;
 use crate::error::Error;
 use crate::index::Index;
 use crate::light::Shape;
-use crate::math::Vec3;
+use crate::math::{Vec3, clamp};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{NO_MIRROR, Scene};
@@ -52,7 +52,7 @@ impl BeamSettings {
 /// The most rays of one row, and so about half the records that it may need while it grows.
 pub fn most_rays(scene: &Scene<'_>, settings: &BeamSettings) -> usize {
     let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
-    ((largest * settings.density).clamp(RAYS.0, RAYS.1) as usize).next_power_of_two()
+    (clamp(largest * settings.density, RAYS.0, RAYS.1) as usize).next_power_of_two()
 }
 
 /// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
@@ -107,7 +107,7 @@ impl Tracer<'_, '_> {
             self.sink.end_row(Row::default(), Some);
             return Some(());
         }
-        let wanted = (area * self.settings.density).clamp(RAYS.0, RAYS.1);
+        let wanted = clamp(area * self.settings.density, RAYS.0, RAYS.1);
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };

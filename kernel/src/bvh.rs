@@ -15,6 +15,7 @@ mod traverse;
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, fabs};
 use crate::ray::{self, Hit, Ray};
 use crate::simd::Isa;
@@ -168,13 +169,12 @@ impl<'m> Bvh<'m> {
             builder(&prepared, &mut tree);
             collapse::collapse(&tree, boxes, children, facets)
         };
-        let (facets, _) = facets.split_at(made.packets.min(facets.len()));
+        let facets = facets.head(made.packets);
         let packets = Arena::new(shared, 0)?.take::<Packet>(facets.len())?;
         for (packet, lanes) in packets.iter_mut().zip(facets) {
             fill(packet, lanes, corners);
         }
-        let (boxes, _) = boxes.split_at(made.nodes.min(boxes.len()));
-        let (children, _) = children.split_at(boxes.len());
+        let (boxes, children) = (boxes.head(made.nodes), children.head(made.nodes));
         Ok(Bvh {
             boxes,
             children,
@@ -256,7 +256,7 @@ fn fill(packet: &mut Packet, lanes: &[u32; LANES], corners: &[[Vec3; 3]]) {
         let [a, b, c] = *facet;
         for (rows, vector) in packet.iter_mut().zip([a, b, c, ray::normal(facet)]) {
             for (row, x) in rows.iter_mut().zip(vector.to_array()) {
-                row[lane] = x;
+                row.set(lane, x);
             }
         }
     }

@@ -12,7 +12,7 @@
 //! F(x) = 1/2 + (asinh(T x) - asinh(x))/(2 ln T) is the energy below x, A(theta)/rho_0 = F(cot theta).
 
 use crate::error::{Error, Field};
-use crate::math::{FRAC_PI_2, PI, TAU, Vec3, atan, cos, exp, fabs, floor, frame, log, sin, sqrt};
+use crate::math::{FRAC_PI_2, PI, TAU, Vec3, atan, clamp, cos, exp, fabs, floor, frame, log, sin, sqrt};
 use crate::quadrature::rule;
 use crate::scene::MIRROR_AXIS_RATIO;
 
@@ -122,7 +122,7 @@ impl Lobe {
     /// Angle to the mirror direction, radians, of the cone that holds the share `u` (0 to 1) of the whole lobe's
     /// energy: the inverse of the lobe's cumulative energy, asin sqrt((T^(2u) - 1)/(T^2 - 1)).
     pub fn cone(&self, u: f64) -> f64 {
-        atan(self.slope(u.clamp(0.0, 1.0 - 1e-12)))
+        atan(self.slope(clamp(u, 0.0, 1.0 - 1e-12)))
     }
 
     /// A direction of the lobe above the facet for (`u`, `v`) in the unit square, with equal energy per area:
@@ -135,13 +135,13 @@ impl Lobe {
     /// root for the position within the slice (energy error below 1e-10); where nothing is cut off, nothing
     /// moves. No sample has n.d < 1e-9, but for rounding.
     pub fn sample(&self, mirror: Vec3, normal: Vec3, u: f64, v: f64) -> Vec3 {
-        let cos_theta = mirror.dot(normal).clamp(-1.0, 1.0);
+        let cos_theta = clamp(mirror.dot(normal), -1.0, 1.0);
         let off = normal - mirror * cos_theta;
         let sin_theta = sqrt(off.dot(off));
         let first = if sin_theta > 1e-8 { off / sin_theta } else { frame(mirror).0 };
         let second = mirror.cross(first);
 
-        let u = u.clamp(0.0, 1.0 - 1e-12);
+        let u = clamp(u, 0.0, 1.0 - 1e-12);
         let slope = self.slope(u);
         let (mut x, mut y) = (slope * cos(TAU * v), slope * sin(TAU * v));
         let albedo = self.albedo(cos_theta);
@@ -188,7 +188,7 @@ impl Lobe {
 
     /// The x with energy `above` above it: F solved for x.
     fn quantile(&self, above: f64) -> f64 {
-        let above = above.clamp(1e-15, 1.0 - 1e-15);
+        let above = clamp(above, 1e-15, 1.0 - 1e-15);
         let below = 1.0 - above;
         let l = self.log_ratio;
         let spread = self.ratio * above * below * sinh_ratio(l * above) * sinh_ratio(l * below);

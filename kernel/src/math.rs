@@ -41,6 +41,19 @@ pub fn reflect(d: Vec3, n: Vec3) -> Vec3 {
     d - n * (2.0 * d.dot(n))
 }
 
+/// `x`, but at least `low` and at most `high`; NaN stays. Unlike the standard library's without an assertion that low <=
+/// high, which would be a panic where it is not inlined.
+#[inline]
+pub fn clamp(x: f64, low: f64, high: f64) -> f64 {
+    if x < low {
+        low
+    } else if x > high {
+        high
+    } else {
+        x
+    }
+}
+
 /// Neumaier's compensated sum: error of a few ulp of the result plus `n eps^2` of the terms' absolute sum.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sum {

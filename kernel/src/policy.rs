@@ -12,7 +12,7 @@ use crate::error::{Error, Field};
 use crate::image::Tally;
 use crate::light::{Light, Shape};
 use crate::lobe::Lobe;
-use crate::math::{pow, sqrt};
+use crate::math::{clamp, pow, sqrt};
 use crate::radiosity::{System, bound, sweeps};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sky::LARGEST;
@@ -61,7 +61,7 @@ pub fn beams(
     if scene.largest_specular() == 0.0 || !diffuse || max_bounces == Some(0) {
         return None;
     }
-    let rays = (100.0 / tolerance).clamp(32768.0, 1e8);
+    let rays = clamp(100.0 / tolerance, 32768.0, 1e8);
     let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
     Some(BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors))
 }

@@ -10,7 +10,7 @@ mod input;
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
-use crate::index::Index;
+use crate::index::{Index, pieces};
 use crate::math::{Vec3, sqrt, unit};
 
 pub use input::*;
@@ -375,7 +375,7 @@ fn lay_normals<'m>(mesh: &dyn Mesh, flat: &[Vec3], arena: &mut Arena<'m>) -> Res
 
 /// Writes the materials' values into the tables of diffuse, specular and emission.
 fn lay_values(mesh: &dyn Mesh, tables: [&mut [f64]; 3]) {
-    let [diffuse, specular, emission] = tables.map(|t| t.chunks_mut(mesh.bands().max(1)));
+    let [diffuse, specular, emission] = tables.map(|t| pieces(t, mesh.bands()));
     for (index, ((d, s), e)) in diffuse.zip(specular).zip(emission).enumerate() {
         let material = mesh.material(index);
         for (to, from) in [(d, material.diffuse), (s, material.specular), (e, material.emission)] {

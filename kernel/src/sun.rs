@@ -1,7 +1,7 @@
 //! The sun: a point or a disc of uniform radiance.
 
 use crate::error::{Error, Field};
-use crate::math::{PI, TAU, Vec3, acos, asin, cos, frame, sin, sqrt, unit};
+use crate::math::{PI, TAU, Vec3, acos, asin, clamp, cos, frame, sin, sqrt, unit};
 use crate::scene::MAX_BANDS;
 use crate::sky::{LARGEST, check_bands};
 
@@ -106,7 +106,7 @@ impl<'a> Sun<'a> {
         }
         let across = sqrt(1.0 - height * height);
         // the disc's edge is above the plane for azimuths below `arc`; the horizon crosses it over 2 `chord`
-        let arc = acos((-self.cosine * height / (self.sine * across)).clamp(-1.0, 1.0));
+        let arc = acos(clamp(-self.cosine * height / (self.sine * across), -1.0, 1.0));
         let sine = sqrt((self.sine - height) * (self.sine + height)) / across;
         let chord = asin(sine.min(1.0));
         let product = sine * self.cosine / across;

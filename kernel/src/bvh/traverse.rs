@@ -9,7 +9,7 @@
 //! right sign, and what is left is three roundings of 2^-24 relative, which [`WIDEN`] covers.
 
 use super::{Boxes, Bvh, LEAF, PAIR, Packet, STACK};
-use crate::index::IndexMut;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, fabs};
 use crate::ray::{Hit, Line, Ray};
 use crate::simd::{self, LaneTask, Lanes};
@@ -100,15 +100,14 @@ impl<'a> Walk<'a> {
         let direction = ray.direction.to_array();
         let inverse =
             direction.map(|c| if fabs(c) > SMALLEST { (1.0 / c) as f32 } else { (1.0 / SMALLEST) as f32 });
-        let outward = inverse.map(|c| if c < 0.0 { -pad } else { pad });
-        let origin = origin.to_array();
+        let outward = Vec3::from_array(inverse.map(|c| if c < 0.0 { -pad } else { pad }));
         let mut walk = Walk {
             bvh,
             ray,
             line,
             side: inverse.map(|c| usize::from(c < 0.0)),
-            near: [0, 1, 2].map(|k| (origin[k] + outward[k]) as f32),
-            far: [0, 1, 2].map(|k| (origin[k] - outward[k]) as f32),
+            near: (origin + outward).to_array().map(|x| x as f32),
+            far: (origin - outward).to_array().map(|x| x as f32),
             inverse,
             start,
             pad,
@@ -255,7 +254,11 @@ impl<L: Lanes> Beam<L> {
             far: [lanes.splat8(f[0]), lanes.splat8(f[1]), lanes.splat8(f[2])],
             inverse: [lanes.splat8(i[0]), lanes.splat8(i[1]), lanes.splat8(i[2])],
             axes: walk.line.axes,
-            origin: [lanes.splat4(origin[first]), lanes.splat4(origin[second]), lanes.splat4(origin[along])],
+            origin: [
+                lanes.splat4(origin.at(first)),
+                lanes.splat4(origin.at(second)),
+                lanes.splat4(origin.at(along)),
+            ],
             shear: [lanes.splat4(walk.line.shear[0]), lanes.splat4(walk.line.shear[1])],
         }
     }
@@ -266,12 +269,13 @@ impl<L: Lanes> Beam<L> {
         let lanes = self.lanes;
         let mut near = lanes.splat8(0.0);
         let mut far = lanes.splat8(f32::INFINITY);
-        for (axis, sides) in boxes.iter().enumerate() {
-            let side = self.side[axis] & 1;
-            let entry = lanes.sub8(lanes.load8(&sides[side]), self.near[axis]);
-            let exit = lanes.sub8(lanes.load8(&sides[1 - side]), self.far[axis]);
-            near = lanes.max8(lanes.mul8(entry, self.inverse[axis]), near);
-            far = lanes.min8(lanes.mul8(exit, self.inverse[axis]), far);
+        let rays = self.near.iter().zip(&self.far).zip(&self.inverse).zip(&self.side);
+        for ([low, high], (((&start, &end), &inverse), &side)) in boxes.iter().zip(rays) {
+            let (first, last) = if side == 0 { (low, high) } else { (high, low) };
+            let entry = lanes.sub8(lanes.load8(first), start);
+            let exit = lanes.sub8(lanes.load8(last), end);
+            near = lanes.max8(lanes.mul8(entry, inverse), near);
+            far = lanes.min8(lanes.mul8(exit, inverse), far);
         }
         let far = lanes.min8(lanes.mul8(far, lanes.splat8(WIDEN)), lanes.splat8(limit));
         (near, lanes.le8(near, far))

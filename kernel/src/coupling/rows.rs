@@ -15,8 +15,8 @@ use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::Elements;
 use crate::error::Error;
-use crate::index::Index;
-use crate::math::{Vec3, fabs, frame, pow, sqrt};
+use crate::index::{Index, IndexMut};
+use crate::math::{Vec3, clamp, fabs, frame, pow, sqrt};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash, hash2, triangle};
 use crate::scene::Scene;
@@ -78,7 +78,7 @@ fn slopes(open: [bool; PARTS]) -> [[f64; 2]; PARTS] {
     // of the barycentric weights; from part to part at the corners they change by a half
     const WEIGHTS: [[f64; 2]; PARTS] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
     let corners = open.iter().take(3).filter(|&&o| o).count();
-    let sum = |k: usize| WEIGHTS.iter().zip(open).filter(|(_, o)| *o).map(|(w, _)| w[k]).sum::<f64>();
+    let sum = |k: usize| WEIGHTS.iter().zip(open).filter(|(_, o)| *o).map(|(w, _)| w.at(k)).sum::<f64>();
     let of = |part: usize, k: usize| match corners {
         3 => 2.0 * WEIGHTS[part][k],
         2 => 2.0 * WEIGHTS[part][k] - sum(k),
@@ -100,7 +100,7 @@ const FEWEST: u32 = 64;
 
 /// The power of two nearest to so many rays.
 fn whole(rays: f64) -> u32 {
-    let most = (rays.clamp(f64::from(FEWEST), f64::from(MOST_RAYS)) * SQRT_2) as u32;
+    let most = (clamp(rays, f64::from(FEWEST), f64::from(MOST_RAYS)) * SQRT_2) as u32;
     1 << most.checked_ilog2().unwrap_or(0)
 }
 
@@ -192,7 +192,7 @@ impl Tally {
     fn exposed(&self) -> ([bool; BINS], [u32; BINS]) {
         let mut open = [true; BINS];
         for part in 0..PARTS {
-            let of = |counts: &[u32; BINS], bin: usize| counts[part * PARTS + bin];
+            let of = |counts: &[u32; BINS], bin: usize| counts.at(part * PARTS + bin);
             let sum = |counts: &[u32; BINS]| (0..PARTS).map(|bin| of(counts, bin)).sum::<u32>();
             let inside = |backs: u32, rays: u32| f64::from(backs) >= INSIDE * f64::from(rays);
             for bin in 0..PARTS {
@@ -200,7 +200,7 @@ impl Tally {
                     few if few < FEWEST / PARTS as u32 => (sum(&self.backs), sum(&self.bins)),
                     rays => (of(&self.backs, bin), rays),
                 };
-                open[part * PARTS + bin] = !inside(backs, rays);
+                open.set(part * PARTS + bin, !inside(backs, rays));
             }
         }
         if open == [false; BINS] {
@@ -257,7 +257,7 @@ impl Tracer<'_, '_> {
     /// Turns what the parts saw into the row.
     fn end_row(&mut self, tally: &Tally, roughness: f64) {
         let (open, exposed) = tally.exposed();
-        let rays_of = |part: usize| (0..PARTS).map(|bin| exposed[part * PARTS + bin]).sum::<u32>();
+        let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
         let share = 1.0 / f64::from(tally.rays);

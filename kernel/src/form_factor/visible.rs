@@ -6,7 +6,7 @@ use super::patch::{Patch, patches};
 use super::point::point_to_polygon;
 use super::rule::GAUSS_3;
 use crate::error::Error;
-use crate::math::{Vec3, sqrt, unit};
+use crate::math::{Vec3, clamp, sqrt, unit};
 
 /// Rounding of a height, as a share of the distance.
 const ON_PLANE: f64 = 2e-15;
@@ -104,7 +104,7 @@ pub fn visible_polygon_to_polygon(
     }
     // What differences show is often a hundredth of the tolerance, but so little is not to be relied on.
     let error = error.max(0.25 * tolerance).min(unobstructed);
-    Ok(Estimate { value: value.clamp(0.0, unobstructed), error })
+    Ok(Estimate { value: clamp(value, 0.0, unobstructed), error })
 }
 
 /// The directions that a convex occluder hides: those on the positive side of all planes through the point.

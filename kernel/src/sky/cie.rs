@@ -5,7 +5,7 @@
 //! to the sun.
 
 use crate::error::{Error, Field};
-use crate::math::{FRAC_PI_2, PI, Vec3, acos, atan2, cos, exp, frame, sin, sqrt, unit};
+use crate::math::{FRAC_PI_2, PI, Vec3, acos, atan2, clamp, cos, exp, frame, sin, sqrt, unit};
 use crate::quadrature::rule;
 
 /// a, b, c, d, e of types 1 to 15 (ISO 15469:2004, table 1).
@@ -67,7 +67,7 @@ impl Cie {
     #[inline(always)]
     fn indicatrix(&self, cos_chi: f64) -> f64 {
         let [c, d, e, base] = self.indicatrix;
-        base + c * exp(d * acos(cos_chi.clamp(-1.0, 1.0))) + e * cos_chi * cos_chi
+        base + c * exp(d * acos(clamp(cos_chi, -1.0, 1.0))) + e * cos_chi * cos_chi
     }
 
     #[inline(always)]

@@ -2,7 +2,8 @@
 
 use super::{LARGEST, SkyTable};
 use crate::error::{Error, Field};
-use crate::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, cos, fabs, floor, sin, sqrt, unit};
+use crate::index::Index;
+use crate::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, clamp, cos, fabs, floor, sin, sqrt, unit};
 use crate::quadrature::rule;
 
 /// A validated table in the frame (x toward azimuth 0, y, up).
@@ -96,7 +97,7 @@ impl<'a> Table<'a> {
     pub(super) fn radiance(&self, direction: Vec3, out: &mut [f64]) {
         let (x, y, z) = (direction.dot(self.x), direction.dot(self.y), direction.dot(self.up));
         let zenith = atan2(sqrt(x * x + y * y), z);
-        let down = (zenith / PI * self.rows as f64 - 0.5).clamp(0.0, (self.rows - 1) as f64);
+        let down = clamp(zenith / PI * self.rows as f64 - 0.5, 0.0, (self.rows - 1) as f64);
         let along = atan2(y, x) / TAU * self.columns as f64 - 0.5;
         let (top, left) = (floor(down), floor(along));
         let (t, s) = (down - top, along - left);
@@ -199,10 +200,10 @@ impl<'a> Table<'a> {
             angle = if end >= PI { end - TAU } else { end };
             // corner weights: upper left, upper right, lower left, lower right
             let weights = if inner >= PI || (start >= -inner && end <= inner) {
-                let cosines = [0, 1].map(|side: usize| here.0 * moments[side][0] - here.1 * moments[side][1]);
-                let corner =
-                    |row: usize, side: usize| whole[row][0] * 0.5 * size + whole[row][1] * cosines[side];
-                [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]
+                let cosines = moments.map(|[c, s]| here.0 * c - here.1 * s);
+                let corner = |row: [f64; 2], cosine: f64| row[0] * 0.5 * size + row[1] * cosine;
+                let ([upper, lower], [left, right]) = (whole, cosines);
+                [corner(upper, left), corner(upper, right), corner(lower, left), corner(lower, right)]
             } else if end <= -outer || (start >= outer && end <= TAU - outer) {
                 continue;
             } else {
@@ -210,7 +211,7 @@ impl<'a> Table<'a> {
             };
             let next = if column + 1 == self.columns { 0 } else { column + 1 };
             let corner = |row: usize, column: usize| {
-                rows[row].get(column * self.bands..(column + 1) * self.bands).unwrap_or(&[])
+                rows.at(row).get(column * self.bands..(column + 1) * self.bands).unwrap_or(&[])
             };
             let upper = corner(0, column).iter().zip(corner(0, next));
             let samples = upper.zip(corner(1, column).iter().zip(corner(1, next)));
@@ -274,7 +275,7 @@ impl Rings {
     fn whole(&self) -> [[f64; 2]; 2] {
         [0, 1].map(|row: usize| {
             self.iter().fold([0.0; 2], |[constant, swing], ring| {
-                let share = ring.shares[row];
+                let share = ring.shares.at(row);
                 [constant + share * ring.constant, swing + share * ring.swing]
             })
         })
