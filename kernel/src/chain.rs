@@ -10,6 +10,7 @@ use crate::mirror::{Mirror, Surface};
 use crate::qmc::{Sequence, hash2};
 use crate::ray::Ray;
 use crate::scene::{MAX_BANDS, Scene};
+use crate::sun::Sun;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,8 +180,12 @@ struct Leg {
     lobe: bool,
 }
 
-/// Rays toward the sun's disc: all of the first few agree, or so many are taken.
-const DISC_RAYS: (u32, u32) = (4, 32);
+/// Rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them agree,
+/// these are enough.
+const DISC_RAYS: (u32, u32) = (16, 4);
+
+/// The most rays toward the sun's disc.
+const MOST_DISC_RAYS: u32 = 1024;
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
 const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
@@ -423,7 +428,7 @@ impl Solved<'_> {
         let (unknown, (a, b)) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
-        let sunlit = self.sun_cosine(surface, sample, path);
+        let sunlit = self.sun_cosine(leg, surface, sample, path);
         let mut weight = 0.0;
         for (band, ((to, through), rho)) in to.iter_mut().zip(&leg.through).zip(diffuse).enumerate() {
             let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
@@ -442,7 +447,7 @@ impl Solved<'_> {
 
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[inline]
-    fn sun_cosine(&self, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
+    fn sun_cosine(&self, leg: &Leg, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
         let cosine = sun.cosine(surface.normal);
         if cosine <= 0.0 {
@@ -457,11 +462,9 @@ impl Solved<'_> {
         // them bit by bit
         let (sequence, coordinate, mut count, mut goal) = match sample {
             Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
-            Sample::Alone(seed) | Sample::Glance(seed) => {
-                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.0)
-            }
+            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.0),
+            Sample::Glance(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.1),
         };
-        let single = goal - count == 1;
         let (mut lit, mut all) = (0.0, 0.0);
         while count < goal {
             let (u, v) = sequence.pair(count, coordinate);
@@ -473,12 +476,28 @@ impl Solved<'_> {
                 path.rays += 1;
                 lit += if self.bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
             }
-            if !single && count == DISC_RAYS.0 && lit != 0.0 && lit != all {
+            if count == goal && lit != 0.0 && lit != all {
                 path.sampled = true;
-                goal = if matches!(sample, Sample::Alone(_)) { DISC_RAYS.1 } else { goal };
+                if matches!(sample, Sample::Alone(_)) && count < MOST_DISC_RAYS {
+                    let part = lit / all;
+                    let error = sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
+                    let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
+                    goal *= if error * at_stake > self.settings.tolerance { 2 } else { 1 };
+                }
             }
         }
         if all > 0.0 { cosine * (lit / all) } else { 0.0 }
+    }
+
+    /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
+    fn sun_at_stake(&self, leg: &Leg, surface: &Surface, sun: &Sun<'_>) -> f64 {
+        let diffuse = self.scene.diffuse(surface.material);
+        let mut largest: f64 = 0.0;
+        for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
+            let value = FRAC_1_PI * rho * leg.through.at(band) * sun.irradiance(band);
+            largest = if value > 0.0 { largest.max(value / reference) } else { largest };
+        }
+        largest
     }
 
     /// The sun in a lobe, evaluated directly: E q(sun, view) V.

@@ -84,25 +84,32 @@ const MOST: u32 = 1024;
 /// at edges for 4 to 256 rays.
 const SCATTERED: f64 = 1.2;
 
+/// Error of integrals along lines over that of the jumps that they have left: what lies between lines is not among it.
+const LINES: f64 = 1.5;
+
 /// Share of the contrast with neighbours that rays which have not seen it may miss.
 const UNSEEN: f64 = 0.35;
 
 /// A pixel whose centre differs from the mean of two opposite neighbours by at most so many tolerances keeps the
 /// centre's value: an edge of that contrast brings an error of a fifth of it, and a change that is linear none.
-const FLAT: f64 = 1.5;
+const FLAT: f64 = 2.0;
 
 /// The same of a pixel's difference from its neighbours, that much of which counts as a bend: what changes has details
 /// that no centre shows more often than what does not.
-const STEEP: f64 = 0.5;
+const STEEP: f64 = 0.25;
 
 /// The part of the tolerance that sampling the pixels' area may take, as root mean square over the object's pixels.
-const PART: f64 = 0.4;
+const PART: f64 = 0.5;
 
 /// Largest error of one pixel, in tolerances.
 const LARGEST: f64 = 2.0;
 
 /// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line.
 const PARTS: usize = 4;
+
+/// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
+/// are up to so many times the error wanted.
+const COARSE: f64 = 60.0;
 
 /// Narrowest parts between lines, and along them.
 const NARROWEST: (f64, f64) = (1.0 / 64.0, 1.0 / 4096.0);
@@ -117,9 +124,9 @@ const SHIFT: f64 = 64.0 * 0.101_127_124_296_868_43;
 /// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
 ///
 /// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre and eight
-/// neighbours vary linearly, to 1.5 tolerances, keeps its centre's value. Others are integrated along lines, by
-/// rays that halve the places of jumps, until the row's root mean square error is 0.4 tolerances; where lobes or
-/// penumbrae are in a pixel, whose radiance is a mean of rays itself, by scattered rays instead.
+/// neighbours vary linearly, to two tolerances, keeps its centre's value. Others are integrated along lines, by
+/// rays that halve the places of jumps, until the row's root mean square error is half the tolerance; where lobes or
+/// penumbrae are in a pixel, whose radiance is a mean of rays itself, or few rays do, by scattered rays instead.
 ///
 /// # Errors
 /// [`Error::Range`] for rows outside the image, [`Error::Length`] for outputs of another size.
@@ -221,7 +228,11 @@ impl<'a> Painter<'a, '_> {
                 uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
             }
         }
-        if uneven > 0.0 { tolerance * (PART * sqrt(object / uneven)).min(LARGEST) } else { LARGEST * tolerance }
+        if uneven > 0.0 {
+            tolerance * (PART * sqrt(object / uneven)).min(LARGEST)
+        } else {
+            LARGEST * tolerance
+        }
     }
 
     /// Whether a pixel keeps its centre's value.
@@ -305,35 +316,34 @@ impl<'a> Painter<'a, '_> {
         largest
     }
 
+    /// How values are compared.
     fn measure(&self) -> Measure<'a> {
         Measure { bands: self.solved.shape.bands, reference: self.solved.reference }
     }
 
     /// The mean over a pixel's square to about the error `goal`; returns the error expected.
-    fn refine(
-        &mut self,
-        target: &mut Target<'_>,
-        index: usize,
-        row: isize,
-        column: isize,
-        goal: f64,
-    ) -> f64 {
+    fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
         self.tally.refined += 1;
         let mut sampled = false;
         let measure = self.measure();
         let (mut along, mut down) = (0.0, 0.0);
         for i in -1..=1 {
-            let centre = |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+            let centre =
+                |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
             for j in -1..=1 {
                 sampled |= centre(i, j).at(self.stride - 2) > 0.0;
             }
             along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
             down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
         }
-        if !sampled && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal) {
+        let contrast = along.max(down);
+        if !sampled
+            && contrast > COARSE * goal
+            && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal)
+        {
             return error;
         }
-        self.scatter(target, index, (row, column), along.max(down), goal)
+        self.scatter(target, index, (row, column), contrast, goal)
     }
 
     /// The mean over a pixel's square along lines in the direction in which its neighbourhood changes most; `None` where
@@ -381,7 +391,7 @@ impl<'a> Painter<'a, '_> {
         let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
         self.put(target, index, 1.0, |this, i| this.work.at(2 * lines::memory(stride) + i));
-        Some(sqrt(error2))
+        Some(LINES * sqrt(error2))
     }
 
     /// Writes a pixel's terms, numbered by band within each term, times `share`.
@@ -444,7 +454,9 @@ impl<'a> Painter<'a, '_> {
         }
         let bands = self.solved.shape.bands;
         self.put(target, index, 1.0 / f64::from(n), |_, i| {
-            [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse].get(i / bands).map_or(0.0, |t| t.at(i % bands))
+            [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse]
+                .get(i / bands)
+                .map_or(0.0, |t| t.at(i % bands))
         });
         error
     }

@@ -26,7 +26,10 @@ impl fmt::Display for Sampled {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Sampled { eps, kept, estimate, seconds, tally } = self;
         let Tally { object_pixels, refined, primary, chain, .. } = tally;
-        write!(f, "{eps:.3e},{kept:.3e},{estimate:.3e},{object_pixels},{refined},{primary},{chain},{seconds:.4}")
+        write!(
+            f,
+            "{eps:.3e},{kept:.3e},{estimate:.3e},{object_pixels},{refined},{primary},{chain},{seconds:.4}"
+        )
     }
 }
 
