@@ -10,6 +10,7 @@ use crate::mirror::{Mirror, Surface};
 use crate::qmc::{Sequence, hash2};
 use crate::ray::Ray;
 use crate::scene::{MAX_BANDS, Scene};
+use crate::sun::Sun;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +102,8 @@ pub struct Path {
     pub tail: f64,
     /// Expected error from the diffuse solution, relative to the reference radiance.
     pub noise: f64,
+    /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
+    pub sampled: bool,
 }
 
 /// Which ray of an image it is, so that lobes and penumbrae of different rays are sampled apart.
@@ -108,7 +111,11 @@ pub struct Path {
 pub enum Sample {
     /// A ray that stands for itself: lobes and penumbrae are integrated.
     Alone(u32),
-    /// Ray number `index` of those that `seed` names and whose mean counts: one point of the sun's disc each.
+    /// A ray that stands for itself unless it meets lobes or penumbrae ([`Path::sampled`]): then it is one of many
+    /// that are wanted.
+    Glance(u32),
+    /// Ray number `index` of those that `seed` names and whose mean counts: one point of the sun's disc and one ray of
+    /// each lobe. Coordinates 2 to 5 of the sequence `seed` choose them; 0 and 1 are for the place in the pixel.
     OneOf {
         /// Names the rays.
         seed: u32,
@@ -121,23 +128,15 @@ impl Sample {
     /// A number for the sequences of one ray.
     fn seed(self) -> u32 {
         match self {
-            Sample::Alone(seed) => seed,
+            Sample::Alone(seed) | Sample::Glance(seed) => seed,
             Sample::OneOf { seed, index } => hash2(seed, index + 1),
-        }
-    }
-
-    /// Rays of one pixel share its lobes.
-    fn share(self) -> f64 {
-        match self {
-            Sample::Alone(_) => 1.0,
-            Sample::OneOf { .. } => 0.125,
         }
     }
 
     /// Turns by which the rays of a lobe's set are rotated, so that sets that count together differ.
     fn turn(self, set: u32) -> f64 {
         let index = match self {
-            Sample::Alone(_) => 0,
+            Sample::Alone(_) | Sample::Glance(_) => 0,
             Sample::OneOf { index, .. } => index,
         };
         let (turn, _) = Sequence::new(0x10be).pair(hash2(index, set) & 0xffff, 0);
@@ -147,17 +146,20 @@ impl Sample {
     /// The point of the unit square that chooses the ray of lobe number `lobe` of a chain, the first to branch being
     /// number 1.
     ///
-    /// Rays that count together are spread over the square: at the second lobe by multiples of powers of the plastic
-    /// number, which together with the first lobe's sunflower fill four dimensions more evenly than nets whose
-    /// count is no power of two; beyond by a sequence of their own.
+    /// Rays that count together are spread over the square: at the first lobe by the sequence that chooses their other
+    /// points, too; at the second by multiples of powers of the plastic number, which together with the first lobe's
+    /// sunflower fill four dimensions more evenly than nets whose count is no power of two; beyond at random.
     fn lobe_point(self, lobe: u32) -> (f64, f64) {
         let (seed, index) = match self {
-            Sample::Alone(seed) => (seed, 0),
+            Sample::Alone(seed) | Sample::Glance(seed) => (seed, 0),
             Sample::OneOf { seed, index } => (seed, index),
         };
+        if lobe == 1 {
+            return Sequence::new(seed).pair(index & 0xffff, 4);
+        }
         let sequence = Sequence::new(hash2(seed, lobe));
         if lobe != 2 {
-            return sequence.pair(index & 0xffff, 0);
+            return sequence.pair(hash2(index, lobe) & 0xffff, 0);
         }
         let (a, b) = sequence.pair(0, 0);
         let (x, y) = (a + f64::from(index) * PLASTIC.0, b + f64::from(index) * PLASTIC.1);
@@ -178,8 +180,12 @@ struct Leg {
     lobe: bool,
 }
 
-/// Rays toward the sun's disc: all of the first few agree, or so many are taken.
-const DISC_RAYS: (u32, u32) = (4, 32);
+/// Rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them agree,
+/// these are enough.
+const DISC_RAYS: (u32, u32) = (16, 4);
+
+/// The most rays toward the sun's disc.
+const MOST_DISC_RAYS: u32 = 1024;
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
 const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
@@ -260,7 +266,7 @@ impl Solved<'_> {
         path
     }
 
-    /// Follows a chain to its end; the first lobe branches, all others take one ray.
+    /// Follows a chain to its end; the first lobe branches where the ray stands for itself, all others take one ray.
     fn follow(&self, mut leg: Leg, sample: Sample, terms: &mut Terms, path: &mut Path) {
         loop {
             let Some(hit) = self.bvh.closest(&leg.ray) else {
@@ -297,7 +303,9 @@ impl Solved<'_> {
                 Some(_) => {
                     self.add_sun_gloss(&leg, &surface, &mirror, terms);
                     leg.lobes += 1;
-                    if leg.lobes == 1 {
+                    let asked = self.scene.gloss_rays(surface.material).is_some();
+                    path.sampled |= !asked;
+                    if leg.lobes == 1 && (asked || matches!(sample, Sample::Alone(_))) {
                         self.branch(&leg, &surface, &mirror, sample, terms, path);
                         return;
                     }
@@ -336,7 +344,7 @@ impl Solved<'_> {
         let largest = through.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
 
         let asked = self.scene.gloss_rays(surface.material);
-        let mut goal = asked.unwrap_or_else(|| self.first_rays(largest, sample));
+        let mut goal = asked.unwrap_or_else(|| self.first_rays(largest));
         let mut fan = Fan { terms: Terms::ZERO, path: Path::default(), squares: [0.0; MAX_BANDS], count: 0 };
         for set in 0..2 {
             let n = goal.saturating_sub(fan.count);
@@ -347,7 +355,7 @@ impl Solved<'_> {
                 self.add_ray(Leg { ray, through, lobe: true, ..*leg }, sample, &mut fan);
             }
             if asked.is_none() {
-                goal = self.all_rays(fan.spread(self.reference), sample);
+                goal = self.all_rays(fan.spread(self.reference));
             }
         }
         path.noise += fan.error(self.reference, largest);
@@ -356,15 +364,15 @@ impl Solved<'_> {
 
     /// Rays of a lobe's first set, for a lobe whose light counts `through`: what they may miss between them is small
     /// against the tolerance.
-    fn first_rays(&self, through: f64, sample: Sample) -> u32 {
+    fn first_rays(&self, through: f64) -> u32 {
         let wanted = FIRST_RAYS * through / self.settings.tolerance;
-        ((sample.share() * wanted.min(MOST_LOBE_RAYS)) as u32).max(FEWEST_LOBE_RAYS)
+        (wanted.min(MOST_LOBE_RAYS) as u32).max(FEWEST_LOBE_RAYS)
     }
 
     /// Rays of both sets, by the standard deviation of the first one's.
-    fn all_rays(&self, spread: f64, sample: Sample) -> u32 {
+    fn all_rays(&self, spread: f64) -> u32 {
         let wanted = pow(LOBE_ERROR * spread / (LOBE_GOAL * self.settings.tolerance), 1.0 / LOBE_POWER);
-        (sample.share() * wanted.min(MOST_LOBE_RAYS)) as u32
+        wanted.min(MOST_LOBE_RAYS) as u32
     }
 
     /// One more ray of a lobe, to its end.
@@ -420,7 +428,7 @@ impl Solved<'_> {
         let (unknown, (a, b)) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
-        let sunlit = self.sun_cosine(surface, sample, path);
+        let sunlit = self.sun_cosine(leg, surface, sample, path);
         let mut weight = 0.0;
         for (band, ((to, through), rho)) in to.iter_mut().zip(&leg.through).zip(diffuse).enumerate() {
             let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
@@ -439,7 +447,7 @@ impl Solved<'_> {
 
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[inline]
-    fn sun_cosine(&self, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
+    fn sun_cosine(&self, leg: &Leg, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
         let cosine = sun.cosine(surface.normal);
         if cosine <= 0.0 {
@@ -450,13 +458,16 @@ impl Solved<'_> {
             let shadow = self.bvh.occluded(&surface.leave(sun.direction()));
             return if shadow { 0.0 } else { cosine };
         }
-        let (sequence, mut count, mut goal) = match sample {
-            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, DISC_RAYS.0),
-            Sample::OneOf { seed, index } => (Sequence::new(hash2(seed, 0x0d15_c000)), index, index + 1),
+        // other coordinates than those of the place in the pixel: the same ones of another sequence are correlated with
+        // them bit by bit
+        let (sequence, coordinate, mut count, mut goal) = match sample {
+            Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
+            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.0),
+            Sample::Glance(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.1),
         };
         let (mut lit, mut all) = (0.0, 0.0);
         while count < goal {
-            let (u, v) = sequence.pair(count, 0);
+            let (u, v) = sequence.pair(count, coordinate);
             let toward = sun.sample(u, v);
             let share = sun.share(toward, surface.normal);
             count += 1;
@@ -465,11 +476,28 @@ impl Solved<'_> {
                 path.rays += 1;
                 lit += if self.bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
             }
-            if matches!(sample, Sample::Alone(_)) && count == DISC_RAYS.0 && lit != 0.0 && lit != all {
-                goal = DISC_RAYS.1;
+            if count == goal && lit != 0.0 && lit != all {
+                path.sampled = true;
+                if matches!(sample, Sample::Alone(_)) && count < MOST_DISC_RAYS {
+                    let part = lit / all;
+                    let error = sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
+                    let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
+                    goal *= if error * at_stake > self.settings.tolerance { 2 } else { 1 };
+                }
             }
         }
         if all > 0.0 { cosine * (lit / all) } else { 0.0 }
+    }
+
+    /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
+    fn sun_at_stake(&self, leg: &Leg, surface: &Surface, sun: &Sun<'_>) -> f64 {
+        let diffuse = self.scene.diffuse(surface.material);
+        let mut largest: f64 = 0.0;
+        for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
+            let value = FRAC_1_PI * rho * leg.through.at(band) * sun.irradiance(band);
+            largest = if value > 0.0 { largest.max(value / reference) } else { largest };
+        }
+        largest
     }
 
     /// The sun in a lobe, evaluated directly: E q(sun, view) V.

@@ -1,14 +1,17 @@
 //! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
 
+mod lines;
+
 use crate::arena::{Arena, Need};
 use crate::camera::{Camera, Sampling};
 use crate::chain::{Sample, Solved, Terms};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy};
-use crate::math::{fabs, pow, sqrt};
+use crate::math::{floor, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
+use lines::{Fineness, Measure, integrate};
 
 /// What was done on a range of rows; ranges add up with [`Tally::add`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,24 +62,71 @@ pub struct Target<'o> {
     pub components: [&'o mut [f32]; 3],
 }
 
-/// Bytes of scratch memory for [`rows`]: three rows of pixel centres.
+/// Bytes of scratch memory for [`rows`]: three rows of pixel centres, and what integrals over a pixel hold.
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
-    Need::new().and::<f64>(3 * (camera.columns() + 2) * (3 * bands + 3)).bytes()
+    let centres = 3 * (camera.columns() + 2) * (3 * bands + NOTES);
+    Need::new().and::<f64>(centres).and::<f64>(work(bands)).bytes()
 }
 
-/// Fewest and most rays through a pixel that is sampled more than once.
-const FEWEST: u32 = 4;
-const MOST: u32 = 256;
+/// Values of two nested integrals and the result.
+fn work(bands: usize) -> usize {
+    2 * lines::memory(3 * bands) + 3 * bands
+}
 
-/// A pixel whose centre differs from its neighbours by at most this many tolerances keeps the centre's value: an
-/// edge of that contrast, on one pixel in five, brings an error of half the tolerance.
-const FLAT: f64 = 3.0;
+/// Beside the three terms of a pixel's centre: object, noise, tail, sampled, unevenness.
+const NOTES: usize = 5;
+
+/// Fewest and most rays through a pixel that is sampled by scattered rays.
+const FEWEST: u32 = 8;
+const MOST: u32 = 1024;
+
+/// Error of the mean of n scattered rays of the standard deviation s over s n^-3/4: 0.8 to 1.2 in penumbrae, lobes and
+/// at edges for 4 to 256 rays.
+const SCATTERED: f64 = 1.2;
+
+/// Error of integrals along lines over that of the jumps that they have left: what lies between lines is not among it.
+const LINES: f64 = 1.5;
+
+/// Share of the contrast with neighbours that rays which have not seen it may miss.
+const UNSEEN: f64 = 0.35;
+
+/// A pixel whose centre differs from the mean of two opposite neighbours by at most so many tolerances keeps the
+/// centre's value: an edge of that contrast brings an error of a fifth of it, and a change that is linear none.
+const FLAT: f64 = 2.0;
+
+/// The same of a pixel's difference from its neighbours, that much of which counts as a bend: what changes has details
+/// that no centre shows more often than what does not.
+const STEEP: f64 = 0.25;
+
+/// The part of the tolerance that sampling the pixels' area may take, as root mean square over the object's pixels.
+const PART: f64 = 0.5;
+
+/// Largest error of one pixel, in tolerances.
+const LARGEST: f64 = 2.0;
+
+/// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line.
+const PARTS: usize = 4;
+
+/// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
+/// are up to so many times the error wanted.
+const COARSE: f64 = 60.0;
+
+/// Narrowest parts between lines, and along them.
+const NARROWEST: (f64, f64) = (1.0 / 64.0, 1.0 / 4096.0);
+
+/// Lines of a pixel that has cost so many rays are not halved.
+const ENOUGH: u64 = 2048;
+
+/// Places along lines shift by this from line to line: its multiples by the powers of two up to 16, between which
+/// lines are halved, fill the unit interval evenly (16 times it is the golden ratio).
+const SHIFT: f64 = 64.0 * 0.101_127_124_296_868_43;
 
 /// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
 ///
-/// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre differs
-/// from none of its eight neighbours by more than three tolerances keeps its centre's value; others get 4 to 256
-/// rays, error about half the difference times n^-3/4.
+/// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre and eight
+/// neighbours vary linearly, to two tolerances, keeps its centre's value. Others are integrated along lines, by
+/// rays that halve the places of jumps, until the row's root mean square error is half the tolerance; where lobes or
+/// penumbrae are in a pixel, whose radiance is a mean of rays itself, or few rays do, by scattered rays instead.
 ///
 /// # Errors
 /// [`Error::Range`] for rows outside the image, [`Error::Length`] for outputs of another size.
@@ -102,10 +152,11 @@ pub fn rows(
     }
     let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
     let width = camera.columns() + 2;
-    let stride = 3 * bands + 3;
+    let stride = 3 * bands + NOTES;
     let lines = arena.take::<f64>(3 * width * stride)?;
-    let mut painter =
-        Painter { solved, camera, lines, width, stride, terms: Terms::ZERO, tally: Tally::default() };
+    let work = arena.take::<f64>(work(bands))?;
+    let (terms, tally) = (Terms::ZERO, Tally::default());
+    let mut painter = Painter { solved, camera, lines, work, width, stride, terms, tally };
     match camera.sampling() {
         Sampling::Centre => painter.centres(range, target),
         Sampling::Area => painter.areas(range, target),
@@ -116,15 +167,16 @@ pub fn rows(
 struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
     camera: &'a Camera,
-    /// Three rows of pixel centres, with a column more on either side: three terms, then object, noise, tail.
+    /// Three rows of pixel centres, with a column more on either side: three terms, then [`NOTES`].
     lines: &'s mut [f64],
+    work: &'s mut [f64],
     width: usize,
     stride: usize,
     terms: Terms,
     tally: Tally,
 }
 
-impl Painter<'_, '_> {
+impl<'a> Painter<'a, '_> {
     fn centres(&mut self, range: Range<usize>, target: &mut Target<'_>) {
         let columns = self.camera.columns();
         for (i, row) in range.enumerate() {
@@ -146,17 +198,54 @@ impl Painter<'_, '_> {
         }
         for row in first..last {
             self.line(row + 1, -1..columns + 1);
+            let goal = self.goal(row, columns);
             for j in 0..columns {
                 let at = self.slot(row, j);
                 self.note(at);
                 let index = (row - first) as usize * columns as usize + j as usize;
-                let contrast = self.contrast(row, j);
-                if contrast <= FLAT * self.solved.settings.tolerance {
+                if self.is_flat(at) {
                     self.write(target, index, at);
+                    self.err(at, 0.2 * self.lines.at(at + self.stride - 1));
                 } else {
-                    self.refine(target, index, row as usize, j as usize, contrast);
+                    let error = self.refine(target, index, row, j, goal);
+                    self.err(at, error);
                 }
             }
+        }
+    }
+
+    /// Finds the unevenness about all pixels of a row, and the error that each of its uneven ones may have for the
+    /// row's root mean square to be a small part of the tolerance.
+    fn goal(&mut self, row: isize, columns: isize) -> f64 {
+        let tolerance = self.solved.settings.tolerance;
+        let (mut object, mut uneven) = (0.0, 0.0);
+        for j in 0..columns {
+            let value = self.unevenness(row, j);
+            let end = self.slot(row, j) + self.stride;
+            self.lines.set(end - 1, value);
+            if self.lines.at(end - NOTES) > 0.0 {
+                object += 1.0;
+                uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
+            }
+        }
+        if uneven > 0.0 {
+            tolerance * (PART * sqrt(object / uneven)).min(LARGEST)
+        } else {
+            LARGEST * tolerance
+        }
+    }
+
+    /// Whether a pixel keeps its centre's value.
+    fn is_flat(&self, at: usize) -> bool {
+        let end = at + self.stride;
+        let (sampled, uneven) = (self.lines.at(end - 2), self.lines.at(end - 1));
+        sampled == 0.0 && uneven <= FLAT * self.solved.settings.tolerance
+    }
+
+    /// Counts the error of an object pixel's area sampling.
+    fn err(&mut self, at: usize, error: f64) {
+        if self.lines.at(at + self.stride - NOTES) > 0.0 {
+            self.tally.sampling2 += error * error;
         }
     }
 
@@ -172,8 +261,12 @@ impl Painter<'_, '_> {
         for j in columns {
             let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
             self.terms.clear(bands);
-            let path =
-                self.solved.radiance(&ray, Sample::Alone(hash2(row as u32, j as u32)), &mut self.terms);
+            let seed = hash2(row as u32, j as u32);
+            let sample = match self.camera.sampling() {
+                Sampling::Centre => Sample::Alone(seed),
+                Sampling::Area => Sample::Glance(seed),
+            };
+            let path = self.solved.radiance(&ray, sample, &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let at = self.slot(row, j);
@@ -181,15 +274,15 @@ impl Painter<'_, '_> {
             copy(slot.part_mut(0..bands), &self.terms.diffuse);
             copy(slot.part_mut(bands..2 * bands), &self.terms.mirror_sky);
             copy(slot.part_mut(2 * bands..3 * bands), &self.terms.mirror_diffuse);
-            let notes = [f64::from(u8::from(path.object)), path.noise, path.tail];
-            copy(slot.part_mut(3 * bands..3 * bands + 3), &notes);
+            let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
+            copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, path.noise, path.tail, sampled, 0.0]);
         }
     }
 
     /// Counts an object pixel and its expected errors.
     fn note(&mut self, at: usize) {
-        let end = at + self.stride;
-        let (object, noise, tail) = (self.lines.at(end - 3), self.lines.at(end - 2), self.lines.at(end - 1));
+        let notes = at + self.stride - NOTES;
+        let [object, noise, tail] = [0, 1, 2].map(|i| self.lines.at(notes + i));
         if object > 0.0 {
             self.tally.object_pixels += 1;
             self.tally.noise2 += noise * noise;
@@ -209,35 +302,124 @@ impl Painter<'_, '_> {
         }
     }
 
-    /// Largest difference between a pixel's centre and its neighbours', relative to the reference radiance.
-    fn contrast(&self, row: isize, column: isize) -> f64 {
-        let bands = self.solved.shape.bands;
-        let value = |at: usize, band: usize| {
-            self.lines.at(at + band) + self.lines.at(at + bands + band) + self.lines.at(at + 2 * bands + band)
-        };
-        let centre = self.slot(row, column);
+    /// Largest difference between a pixel's centre and the mean of two opposite neighbours, relative to the reference
+    /// radiance.
+    fn unevenness(&self, row: isize, column: isize) -> f64 {
+        let measure = self.measure();
+        let centre = |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
         let mut largest: f64 = 0.0;
-        for i in row - 1..=row + 1 {
-            for j in column - 1..=column + 1 {
-                let at = self.slot(i, j);
-                for band in 0..bands {
-                    let difference = fabs(value(at, band) - value(centre, band));
-                    if difference > 0.0 {
-                        largest = largest.max(difference / self.solved.reference.at(band));
-                    }
-                }
-            }
+        for (i, j) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+            let [before, here, after] = [centre(-i, -j), centre(0, 0), centre(i, j)];
+            let contrast = measure.step(before, here).max(measure.step(here, after));
+            largest = largest.max(measure.bend(before, here, after)).max(STEEP * contrast);
         }
         largest
     }
 
-    /// The mean over a pixel's square, from as many rays as the contrast asks for.
-    fn refine(&mut self, target: &mut Target<'_>, index: usize, row: usize, column: usize, contrast: f64) {
+    /// How values are compared.
+    fn measure(&self) -> Measure<'a> {
+        Measure { bands: self.solved.shape.bands, reference: self.solved.reference }
+    }
+
+    /// The mean over a pixel's square to about the error `goal`; returns the error expected.
+    fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
+        self.tally.refined += 1;
+        let mut sampled = false;
+        let measure = self.measure();
+        let (mut along, mut down) = (0.0, 0.0);
+        for i in -1..=1 {
+            let centre =
+                |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+            for j in -1..=1 {
+                sampled |= centre(i, j).at(self.stride - 2) > 0.0;
+            }
+            along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
+            down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
+        }
+        let contrast = along.max(down);
+        if !sampled
+            && contrast > COARSE * goal
+            && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal)
+        {
+            return error;
+        }
+        self.scatter(target, index, (row, column), contrast, goal)
+    }
+
+    /// The mean over a pixel's square along lines in the direction in which its neighbourhood changes most; `None` where
+    /// lobes or penumbrae are in it.
+    fn lines_across(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        along: bool,
+        goal: f64,
+    ) -> Option<f64> {
+        let (solved, camera, measure) = (self.solved, self.camera, self.measure());
+        let stride = measure.stride();
+        let Painter { work, terms, tally, .. } = self;
+        let (outer, rest) = work.split_at_mut(lines::memory(stride));
+        let (inner, out) = rest.split_at_mut(lines::memory(stride));
+        let seed = hash2(row as u32, column as u32);
+        let (turn, _) = Sequence::new(seed).pair(0, 0);
+        let before = tally.primary;
+        let goal = 0.7 * goal;
+        let mut line = |y: f64, out: &mut [f64]| {
+            let shift = turn + SHIFT * y;
+            let shift = (shift - floor(shift) - 0.5) / PARTS as f64;
+            let mut places = [0.0; PARTS + 1];
+            places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / PARTS as f64 + shift);
+            (places[0], places[PARTS]) = (0.0, 1.0);
+            let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
+            integrate(&measure, &Fineness { places: &places, goal, narrowest }, inner, out, &mut |x, slot| {
+                let (x, y) = if along { (x, y) } else { (y, x) };
+                let ray = camera.ray(column as f64 + x, row as f64 + y);
+                terms.clear(measure.bands);
+                let path = solved.radiance(&ray, Sample::Glance(seed), terms);
+                tally.primary += 1;
+                tally.chain += u64::from(path.rays);
+                let (diffuse, rest) = slot.split_at_mut_checked(measure.bands)?;
+                let (sky, mirrored) = rest.split_at_mut_checked(measure.bands)?;
+                copy(diffuse, &terms.diffuse);
+                copy(sky, &terms.mirror_sky);
+                copy(mirrored, &terms.mirror_diffuse);
+                (!path.sampled).then_some(0.0)
+            })
+        };
+        let places = [0.0, 0.25, 0.5, 0.75, 1.0];
+        let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
+        let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
+        self.put(target, index, 1.0, |this, i| this.work.at(2 * lines::memory(stride) + i));
+        Some(LINES * sqrt(error2))
+    }
+
+    /// Writes a pixel's terms, numbered by band within each term, times `share`.
+    fn put(&self, target: &mut Target<'_>, index: usize, share: f64, of: impl Fn(&Self, usize) -> f64) {
+        let bands = self.solved.shape.bands;
+        for band in 0..bands {
+            let terms = [0, 1, 2].map(|term| of(self, term * bands + band));
+            target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
+            for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
+                component.set(index * bands + band, (term * share) as f32);
+            }
+        }
+    }
+
+    /// The mean over a pixel's square of scattered rays, as many as their contrast asks for.
+    fn scatter(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        contrast: f64,
+        wanted: f64,
+    ) -> f64 {
         let bands = self.solved.shape.bands;
         let seed = hash2(row as u32, column as u32);
         let sequence = Sequence::new(seed);
         let mut sums = Terms::ZERO;
-        let (mut low, mut high) = ([f64::INFINITY; MAX_BANDS], [f64::NEG_INFINITY; MAX_BANDS]);
+        let mut squares = [0.0; MAX_BANDS];
         let (mut n, mut goal) = (0u32, FEWEST);
         let mut error = 0.0;
         while n < goal {
@@ -248,36 +430,34 @@ impl Painter<'_, '_> {
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             sums.add(&self.terms, bands);
-            for (band, (low, high)) in low.iter_mut().zip(&mut high).enumerate().take(bands) {
-                *low = low.min(self.terms.sum(band));
-                *high = high.max(self.terms.sum(band));
+            for (band, square) in squares.iter_mut().enumerate().take(bands) {
+                *square += self.terms.sum(band) * self.terms.sum(band);
             }
             n += 1;
             if n == goal {
-                let mut seen: f64 = 0.0;
-                for ((low, high), reference) in low.iter().zip(&high).zip(self.solved.reference) {
-                    let d = high - low;
-                    if d > 0.0 {
-                        seen = seen.max(d / reference);
+                let share = 1.0 / f64::from(n);
+                let mut spread: f64 = 0.0;
+                for (band, (square, reference)) in squares.iter().zip(self.solved.reference).enumerate() {
+                    let mean = share * sums.sum(band);
+                    let variance = share * square - mean * mean;
+                    // below: rounding of equal rays
+                    if variance > 1e-12 * mean * mean {
+                        spread = spread.max(sqrt(variance) / reference);
                     }
                 }
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
-                error = 0.5 * seen.max(contrast / sqrt(f64::from(n))) * pow(f64::from(n), -0.75);
-                // a tenth of the pixels lies on edges: sqrt(10) times the tolerance there is the tolerance
-                if error > 2.0 * self.solved.settings.tolerance && goal < MOST {
+                error = SCATTERED * spread.max(UNSEEN * contrast * sqrt(share)) * pow(share, 0.75);
+                if error > wanted && goal < MOST {
                     goal *= 2;
                 }
             }
         }
-        self.tally.refined += 1;
-        self.tally.sampling2 += 0.25 * error * error;
-        let share = 1.0 / f64::from(n);
-        for band in 0..bands {
-            let terms = [sums.diffuse.at(band), sums.mirror_sky.at(band), sums.mirror_diffuse.at(band)];
-            target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
-            for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
-                component.set(index * bands + band, (term * share) as f32);
-            }
-        }
+        let bands = self.solved.shape.bands;
+        self.put(target, index, 1.0 / f64::from(n), |_, i| {
+            [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse]
+                .get(i / bands)
+                .map_or(0.0, |t| t.at(i % bands))
+        });
+        error
     }
 }

@@ -1,6 +1,7 @@
 //! What Blik makes of a case.
 
 use super::case::Case;
+use super::pixels::{self, Sampled};
 use crate::kernel;
 use blik_kernel::Error;
 use blik_kernel::host::{GeometryMemory, Host, Report, Settings};
@@ -22,10 +23,12 @@ pub struct Outcome {
     pub report: Report,
     /// From mesh to image.
     pub seconds: f64,
+    /// What sampling the pixels' area alone brings, if asked for.
+    pub sampled: Option<Sampled>,
 }
 
-/// Geometry, light and image of a case at `tolerance`.
-pub fn run(case: &Case, tolerance: f64) -> Result<Outcome, Error> {
+/// Geometry, light and image of a case at `tolerance`, its pixels compared with so many rays through each.
+pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
     let host = Host::new(0)?;
     let settings = Settings { tolerance, ..Settings::default() };
     let materials: Vec<MaterialInput<'_>> = case
@@ -68,5 +71,6 @@ pub fn run(case: &Case, tolerance: f64) -> Result<Outcome, Error> {
         shares: (0..case.mesh.facets.len()).map(|f| geometry.elements().share(f)).collect(),
         report: image.report,
         seconds,
+        sampled: (rays > 0).then(|| pixels::compare(&lit, &case.camera, rays)).transpose()?,
     })
 }

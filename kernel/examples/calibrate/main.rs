@@ -15,6 +15,7 @@
 //! * `--twin N`: N pixels of each case by the readable twin, too (slow; where pixels are single rays)
 //! * `--causes`: sorts each case's error by what is difficult about its pixels, and the failed cases by their largest
 //!   part
+//! * `--pixels N`: the error that sampling the pixels' area brings alone, against the mean of N rays through each
 //! * `--list`: names the cases and ends
 
 #[path = "../../../tests/support/judge/mod.rs"]
@@ -32,6 +33,7 @@ mod families;
 mod figures;
 mod light;
 mod options;
+mod pixels;
 mod reference;
 mod shapes;
 mod verify;
@@ -116,11 +118,14 @@ fn measure(case: &Case, options: &Options) -> Result<Result<Row, blik_kernel::Er
         eprintln!("case {}: judge and twin differ by {difference:.1e}, noise {noise:.1e}", case.index);
     }
     let tolerance = options.tolerance.unwrap_or(case.tolerance);
-    let outcome = match blik::run(case, tolerance) {
+    let outcome = match blik::run(case, tolerance, options.pixels) {
         Ok(outcome) => outcome,
         Err(error) => return Ok(Err(error)),
     };
     let halves = [0, 1].map(|h| &reference.image.values[h][..]);
+    if let Some(sampled) = &outcome.sampled {
+        eprintln!("sampling,{},{},{tolerance:e},{sampled}", case.index, case.family);
+    }
     let image = score(&outcome.pixels, halves, &reference.image.hit, &outcome.reference);
     let bands = outcome.reference.len();
     let sides = if case.two_sided { 2 } else { 1 };

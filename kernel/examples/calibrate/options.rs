@@ -22,6 +22,8 @@ pub struct Options {
     pub dump: Option<PathBuf>,
     /// Pixels of each case that the twin computes, too.
     pub twin: usize,
+    /// Rays through each pixel of area sampling to compare its value with.
+    pub pixels: u32,
     /// Sort each case's error by what is difficult about its pixels.
     pub causes: bool,
     /// Only name the cases.
@@ -42,6 +44,7 @@ impl Options {
             tolerance: None,
             dump: None,
             twin: 0,
+            pixels: 0,
             causes: false,
             list: false,
         };
@@ -62,6 +65,7 @@ impl Options {
                 Long("tolerance") => self.tolerance = Some(parser.value()?.parse()?),
                 Long("dump") => self.dump = Some(parser.value()?.into()),
                 Long("twin") => self.twin = parser.value()?.parse()?,
+                Long("pixels") => self.pixels = parser.value()?.parse()?,
                 Long("causes") => self.causes = true,
                 Long("list") => self.list = true,
                 other => return Err(other.unexpected()),
