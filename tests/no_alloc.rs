@@ -21,7 +21,7 @@ use blik_kernel::scene::Scene;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyModel};
-use blik_kernel::subdivide;
+use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::Sun;
 use case::{Case, SkyOf, SunOf, orthographic, within};
 use stages::{Plan, Workspace};
@@ -154,17 +154,13 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         short("tree", bytes, |memory| Bvh::build_obvhs(corners, areas, Isa::BASELINE, memory).err());
         let mut memory = vec![0; bytes];
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
-        wrong("unevenness", facets, f64::MAX, |out| subdivide::probe(&scene, &bvh, 16, 0..facets, out).err());
-        let uneven = vec![0.1; facets];
-        wrong("divisions", facets, 77, |out| subdivide::divisions(&scene, &uneven, 1e-2, out).err());
-        let divisions = vec![2; facets];
-        let bytes = Elements::bytes(&divisions).unwrap();
-        short("elements", bytes, |memory| Elements::new(&scene, &divisions, &[], memory).err());
-        let mut memory = vec![0; bytes];
-        assert!(matches!(
-            Elements::new(&scene, &divisions[1..], &[], &mut memory),
-            Err(Error::Length { .. })
-        ));
+        short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| Cut::new(&scene, 1e-2, memory).err());
+        let mut trees = vec![0; Cut::bytes(facets, 1e-2).unwrap()];
+        let mut cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();
+        let (work, _) = cut.work();
+        wrong("unevenness", facets, f64::MAX, |out| work.probe(&scene, &bvh, 16, 1e-2, 0..facets, out).err());
+        let bytes = Elements::bytes(&cut).unwrap();
+        short("elements", bytes, |memory| Elements::new(&scene, &cut, memory).err());
     });
 }
 

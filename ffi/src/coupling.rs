@@ -11,7 +11,8 @@ use blik_kernel::coupling::pack::{move_down, pack};
 use blik_kernel::coupling::rows::{RowSettings, fill};
 use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN, sink};
 use blik_kernel::element::Elements;
-use blik_kernel::{Error, policy, subdivide};
+use blik_kernel::subdivide::{self, Cut};
+use blik_kernel::{Error, policy};
 use core::ffi::c_void;
 use core::ops::Range;
 
@@ -149,33 +150,34 @@ impl Cutter {
 }
 
 /// Bytes that elements and their making need at most.
-fn element_bytes(base: &blik_scene, tolerance: f64) -> usize {
+fn element_bytes(base: &blik_scene, tolerance: f64) -> Result<usize, blik_error> {
     let facets = base.scene.facets();
     let most = subdivide::most_elements(facets, tolerance);
-    // first element and divisions of each facet, facet of each element; unevenness and divisions while making them
-    facets
-        .saturating_mul(4 + 4 + 4 + 8 + 4)
-        .saturating_add(most.saturating_mul(4))
-        .saturating_add(8 * ALIGNMENT)
+    // first element of each facet, all nodes, facet and path of each element; the trees while they grow
+    let kept =
+        facets.saturating_mul(4).saturating_add(most.saturating_mul(4 + 4 + 6)).saturating_add(8 * ALIGNMENT);
+    Ok(Cut::bytes(facets, tolerance)?.saturating_add(kept))
 }
 
-/// How finely each facet is cut, and what decided it, into the front of `scratch`.
-fn divisions<'s>(
+/// How finely each facet is cut.
+fn cut<'s>(
     base: &blik_scene,
     settings: &Settings,
     runner: &mut Runner,
     scratch: &'s mut [u8],
-) -> Result<(&'s [u32], &'s [f64]), blik_error> {
-    let facets = base.scene.facets();
-    let mut arena = blik_kernel::arena::Arena::new(scratch, 0)?;
-    let out = arena.take::<u32>(facets)?;
-    let unevenness = arena.take::<f64>(facets)?;
+) -> Result<Cut<'s>, blik_error> {
+    let tolerance = settings.tolerance;
+    let mut cut = Cut::new(&base.scene, tolerance, scratch)?;
     let probing = policy::probing(&settings.rows(base));
-    runner.rows(unevenness, 1, PROBING, |range, out| {
-        subdivide::probe(&base.scene, &base.bvh, probing, range, out).map(|_| ())
-    })?;
-    subdivide::divisions(&base.scene, unevenness, settings.tolerance, out)?;
-    Ok((out, unevenness))
+    loop {
+        let (work, unevenness) = cut.work();
+        runner.rows(unevenness, 1, PROBING, |range, out| {
+            work.probe(&base.scene, &base.bvh, probing, tolerance, range, out).map(|_| ())
+        })?;
+        if !cut.refine(&base.scene) {
+            return Ok(cut);
+        }
+    }
 }
 
 /// Rows of one piece of work: as many pieces as balance two dozen threads, large enough that a block's head does not
@@ -191,19 +193,19 @@ fn elements(
     runner: &mut Runner,
     cutter: &mut Cutter,
 ) -> Result<Elements<'static>, blik_error> {
-    // the divisions stand at the end of the memory while the elements are made at its front
-    let scratch_bytes = base.scene.facets() * 12 + 3 * ALIGNMENT;
+    // the trees stand at the end of the memory while the elements are made at its front
+    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.tolerance)?;
     let whole = cutter.lend();
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
     let (_, scratch) = whole.split_at_mut_checked(keep).ok_or(short)?;
-    let (divisions, unevenness) = divisions(base, settings, runner, scratch)?;
-    let bytes = Elements::bytes(divisions)?.next_multiple_of(ALIGNMENT);
+    let cut = cut(base, settings, runner, scratch)?;
+    let bytes = Elements::bytes(&cut)?.next_multiple_of(ALIGNMENT);
     if bytes > keep {
         return Err(short.sizes(bytes + scratch_bytes, cutter.size));
     }
     let memory = cutter.take(bytes)?;
-    Ok(Elements::new(&base.scene, divisions, unevenness, memory)?)
+    Ok(Elements::new(&base.scene, &cut, memory)?)
 }
 
 /// Where a finished block stands.
@@ -378,7 +380,7 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     let unknowns = subdivide::most_elements(base.scene.facets(), settings.tolerance) * base.scene.sides();
     let row = sink::bytes(piece(unknowns), 64, policy::unmerged(&rows), base.scene.bands())?;
     let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
-    let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance), table, row];
+    let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance)?, table, row];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
 
@@ -598,12 +600,12 @@ mod owned {
         settings: &Settings,
         runner: &mut Runner,
     ) -> Result<*mut blik_coupling, blik_error> {
-        let mut scratch = Slab::new(base.scene.facets() * 12 + 4 * ALIGNMENT)?;
+        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.tolerance)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
-        let (divisions, unevenness) = divisions(base, settings, runner, unsafe { scratch.bytes_mut() })?;
-        let mut own = Slab::new(Elements::bytes(divisions)?)?;
+        let cut = cut(base, settings, runner, unsafe { scratch.bytes_mut() })?;
+        let mut own = Slab::new(Elements::bytes(&cut)?)?;
         // SAFETY: the handle owns the slab.
-        let elements = Elements::new(&base.scene, divisions, unevenness, unsafe { own.bytes_mut() })?;
+        let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
         let rows = settings.rows(base);
         let (unknowns, piece) = (elements.unknowns(), piece(elements.unknowns()));
         let done = Mutex::new(Vec::new());

@@ -7,6 +7,7 @@ use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
 use blik_kernel::Error;
+use blik_kernel::accuracy;
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::chain::Solved;
@@ -41,7 +42,7 @@ pub(crate) struct Tables {
     pub irradiance: &'static [f64],
     /// Mean of cos V of the sun.
     pub sun: &'static [f64],
-    pub noise: &'static [f32],
+    pub variance: &'static [f32],
     pub brightest: f64,
     pub solver: f64,
     pub sweeps: u32,
@@ -92,7 +93,7 @@ impl blik_solution {
             light: &self.light,
             irradiance: self.tables.irradiance,
             shape: self.shape,
-            noise: self.tables.noise,
+            variance: self.tables.variance,
             reference: self.tables.reference,
             brightest: self.tables.brightest,
             settings: policy::chains(settings.tolerance, settings.max_bounces),
@@ -332,7 +333,7 @@ fn build(
     let (unknowns, shape) = (sizes.unknowns, sizes.shape);
     let sun = arena.take::<f64>(unknowns)?;
     let irradiance = arena.take::<f64>(unknowns * shape.stride())?;
-    let noise = arena.take::<f32>(unknowns)?;
+    let variance = arena.take::<f32>(unknowns)?;
     let direct = arena.take::<f64>(unknowns * shape.stride())?;
     let orders = arena.take::<f64>(unknowns * shape.bands * sizes.orders)?;
     let scratch = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
@@ -340,28 +341,64 @@ fn build(
     let matrix = coupling.matrix()?;
     let shine = Shine { coupling, matrix: &matrix, light: &light, shape };
     let sun_rays = shine.direct(direct, sun, scratch, runner)?;
-    let system = System { scene, elements, coupling: &matrix, light: &light, direct, sun: &*sun, shape };
-    let solve = Solve { system, settings: &coupling.settings, reference };
+    let system = System { scene, elements, coupling: &matrix, light: &light, direct: &[], sun: &*sun, shape };
+    let settings = &coupling.settings;
+    let mut before = 0;
+    if shape.levels == 1 {
+        let first = Solve { system: System { direct, ..system }, settings, reference };
+        before = first.run(orders, irradiance, runner)?.0.map_or(0, |s| s.done);
+        let internal = blik_error::of(BLIK_ERROR_INTERNAL);
+        let (missed, _) = orders.split_at_mut_checked(unknowns * shape.bands).ok_or(internal)?;
+        runner.rows(missed, shape.bands, 0.0, |range, out| {
+            system.slopes(range, irradiance, out);
+            Ok(())
+        })?;
+        light::add(missed, shape, direct);
+    }
+    let solve = Solve { system: System { direct, ..system }, settings, reference };
     let (sweeps, radiance) = solve.run(orders, irradiance, runner)?;
     policy::check_radiance(radiance, shape.bands)?;
-    let contrast = policy::at_stake(&solve.system, reference, radiance);
-    for (place, (_, row)) in noise.iter_mut().zip(matrix.rows(0..unknowns)) {
-        *place = policy::noise(&row.row, contrast);
-    }
+    system.extend(irradiance);
+    // three values of each band in one level at least
+    errors(&system, radiance, reference, direct, variance, runner)?;
     let tables = Tables {
         reference,
         irradiance,
         sun,
-        noise,
+        variance,
         brightest: policy::brightest(scene, &light, reference, radiance),
         solver: sweeps.map_or(0.0, |s| s.error),
-        sweeps: sweeps.map_or(shape.levels as u32, |s| s.done),
+        sweeps: sweeps.map_or(shape.levels as u32, |s| before + s.done),
         sun_rays,
         bytes: sizes.kept().bytes()?,
     };
     // SAFETY: `place` made room for it.
     unsafe { place.write(blik_solution::new(coupling, light, (given.sky, given.sun), tables, shape)) };
     Ok(place.as_ptr())
+}
+
+/// Expected squared error of each unknown; `scratch` holds three values of each and of each band.
+fn errors(
+    system: &System<'_>,
+    radiance: &[f64],
+    reference: &[f64],
+    scratch: &mut [f64],
+    out: &mut [f32],
+    runner: &mut Runner,
+) -> Result<(), blik_error> {
+    let (bands, size) = (system.shape.bands, system.elements.unknowns() * system.shape.bands);
+    let short = blik_error::of(BLIK_ERROR_INTERNAL);
+    let (differences, rest) = scratch.split_at_mut_checked(size).ok_or(short)?;
+    let (mut carried, rest) = rest.split_at_mut_checked(size).ok_or(short)?;
+    let (mut next, _) = rest.split_at_mut_checked(size).ok_or(short)?;
+    runner.rows(differences, bands, 0.0, |range, out| accuracy::differences(system, radiance, range, out))?;
+    carried.fill(0.0);
+    for _ in 0..accuracy::CARRIED {
+        runner
+            .rows(next, bands, 0.0, |range, out| accuracy::carry(system, differences, carried, range, out))?;
+        core::mem::swap(&mut carried, &mut next);
+    }
+    runner.rows(out, 1, 0.0, |range, out| accuracy::rows(system, radiance, carried, reference, range, out))
 }
 
 /// The reference radiance: the caller's, or from the light.

@@ -81,8 +81,8 @@ pub struct Solution<'m> {
     pub irradiance: &'m [f64],
     /// Mean of cos V of the sun of each unknown.
     pub lit: &'m [f64],
-    /// Expected error of each unknown.
-    pub noise: &'m [f32],
+    /// Expected squared error of each unknown.
+    pub variance: &'m [f32],
     /// Numbers.
     pub numbers: Numbers,
 }
@@ -337,7 +337,7 @@ impl<'m> Solution<'m> {
         writer.put(self.reference)?;
         writer.put(self.irradiance)?;
         writer.put(self.lit)?;
-        writer.put(self.noise)
+        writer.put(self.variance)
     }
 
     fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: Shape) -> Result<Solution<'m>, Error> {
@@ -380,8 +380,8 @@ impl<'m> Solution<'m> {
         let numbers = view.take::<Numbers>(1)?.first().copied().ok_or(Error::Block)?;
         let reference = view.take::<f64>(bands)?;
         let irradiance = view.take::<f64>(unknowns.checked_mul(shape.stride()).ok_or(Error::Block)?)?;
-        let (lit, noise) = (view.take::<f64>(unknowns)?, view.take::<f32>(unknowns)?);
-        let solution = Solution { sky, sun, reference, irradiance, lit, noise, numbers };
+        let (lit, variance) = (view.take::<f64>(unknowns)?, view.take::<f32>(unknowns)?);
+        let solution = Solution { sky, sun, reference, irradiance, lit, variance, numbers };
         solution.check()?;
         Ok(solution)
     }
@@ -392,7 +392,7 @@ impl<'m> Solution<'m> {
         // irradiance: pi times the largest radiance, gradients some times that
         let right = self.irradiance.iter().all(|x| x.abs() <= 1e40)
             && self.lit.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
-            && self.noise.iter().all(|x| (0.0..=f32::MAX).contains(x))
+            && self.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))
             && self.reference.iter().all(|x| (0.0..=1e38).contains(x))
             && positive(&self.numbers.brightest)
             && self.numbers.solver >= 0.0;

@@ -163,8 +163,8 @@ impl Tracer<'_, '_> {
             surface = next;
             direction = leaving;
             arrival = Some(direction);
-            let (target, _) = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            let area = scene.areas().at(surface.facet) * self.elements.share(surface.facet);
+            let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
+            let area = scene.areas().at(surface.facet) * self.elements.share(target.0);
             self.sink.push(Record::target(target, word, flux / area, [0.0; 2]))?;
         }
     }

@@ -38,8 +38,8 @@ pub struct Solved<'a> {
     pub irradiance: &'a [f64],
     /// Shape of `irradiance`.
     pub shape: Shape,
-    /// Expected error of each unknown's irradiance over pi, relative to the reference radiance.
-    pub noise: &'a [f32],
+    /// Expected squared error of each unknown's irradiance over pi, relative to the reference radiance.
+    pub variance: &'a [f32],
     /// Reference radiance, one value per band.
     pub reference: &'a [f64],
     /// Largest radiance that any ray can see, relative to the reference radiance, over all bands.
@@ -100,7 +100,9 @@ pub struct Path {
     pub rays: u32,
     /// Most that chains cut before their end could still have brought, relative to the reference radiance.
     pub tail: f64,
-    /// Expected error from the diffuse solution, relative to the reference radiance.
+    /// Expected squared error from the diffuse solution, relative to the reference radiance.
+    pub variance: f64,
+    /// Expected error from sampling lobes, relative to the reference radiance.
     pub noise: f64,
     /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
     pub sampled: bool,
@@ -252,6 +254,8 @@ impl Fan {
         path.rays += self.path.rays;
         path.tail += share * self.path.tail;
         path.noise += share * self.path.noise;
+        // rays of a lobe meet the same elements: their errors are taken as one
+        path.variance += share * self.path.variance;
     }
 }
 
@@ -442,7 +446,7 @@ impl Solved<'_> {
             *to += share * FRAC_1_PI * irradiance;
             weight = f64::max(weight, share);
         }
-        path.noise += weight * f64::from(self.noise.at(unknown));
+        path.variance += weight * weight * f64::from(self.variance.at(unknown));
     }
 
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.

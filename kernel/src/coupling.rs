@@ -11,6 +11,7 @@ pub mod sink;
 pub mod word;
 
 use crate::arena::{View, plain_struct};
+use crate::element::Local;
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::{Vec3, fabs};
@@ -26,6 +27,11 @@ plain_struct! {
         pub weight: f64,
         /// Change of the weight with the local coordinates.
         pub gradient: [f32; 2],
+        /// What tells the weight's error: half the difference between two halves of the rays, of two quarters of the
+        /// element and of the others; the middle quarter's weight beside its neighbours', by either half.
+        pub checks: [f32; 4],
+        /// The weight times where on the target its rays arrive, in local coordinates.
+        pub moment: [f32; 2],
     }
 }
 
@@ -42,13 +48,11 @@ plain_struct! {
         pub rays: u32,
         /// Rays traced beyond the first hits.
         pub chain_rays: u32,
-        /// Share of the element that is not inside a body, where nothing sees it; the row is that part's mean.
+        /// Share of the element that is not inside a body, where nothing sees it; the row is that part's mean, or the
+        /// whole element's where that share is 0.
         pub exposed: f32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
-        /// Difference between the two halves of the row's rays, as a share of the hemisphere: in what is blocked, or in
-        /// which facets block it; and how far light departs from a linear function over the element.
-        pub spread: f64,
     }
 }
 
@@ -89,17 +93,25 @@ const ESCAPE: u64 = 1 << 63;
 pub const BLOCKED: u16 = u16::MAX;
 
 impl Record {
-    /// A target seen along a word.
+    /// A target seen along a word, at a point of it.
     #[inline(always)]
-    pub fn target(unknown: usize, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
-        Record { key: (unknown as u64) << 16 | u64::from(word), weight, gradient }
+    pub fn target((unknown, (a, b)): (usize, Local), word: u16, weight: f64, gradient: [f32; 2]) -> Record {
+        let key = (unknown as u64) << 16 | u64::from(word);
+        let moment = [(weight * a) as f32, (weight * b) as f32];
+        Record { key, weight, gradient, checks: [0.0; 4], moment }
     }
 
     /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
     #[inline(always)]
     pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
         let packed = direction.map_or(0, pack);
-        Record { key: ESCAPE | packed << 16 | u64::from(word), weight, gradient }
+        Record {
+            key: ESCAPE | packed << 16 | u64::from(word),
+            weight,
+            gradient,
+            checks: [0.0; 4],
+            moment: [0.0; 2],
+        }
     }
 
     /// The word.

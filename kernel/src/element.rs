@@ -1,4 +1,4 @@
-//! Elements: facets cut into S^2 congruent triangles, on each of which diffuse light varies linearly.
+//! Elements: facets cut into quarters as [`crate::subdivide`] decides, on each of which diffuse light varies linearly.
 //!
 //! The cut depends on geometry, materials and tolerance, never on the light. An unknown of the linear system
 //! is one side of one element: unknown = element * sides + side.
@@ -8,67 +8,100 @@ mod bake;
 use crate::arena::{Arena, Need};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, sqrt};
+use crate::math::Vec3;
+use crate::quarter::{self, Path, QUARTERS};
 use crate::scene::Scene;
-
-/// The finest cut of one facet: 64^2 elements.
-pub const MAX_DIVISIONS: u32 = 64;
+use crate::subdivide::{Cut, Node};
 
 /// Which elements each facet has.
 #[derive(Clone, Copy, Debug)]
 pub struct Elements<'m> {
     first: &'m [u32],
-    divisions: &'m [u32],
+    /// Of each node of the trees: [`LEAF`] and its element, or the first of its four quarters' nodes.
+    nodes: &'m [u32],
     facet: &'m [u32],
-    roughness: &'m [f32],
+    path: &'m [u32],
     sides: usize,
     memory: usize,
 }
 
+/// Marks nodes that are elements.
+const LEAF: u32 = 1 << 31;
+
 /// A point on an element: its local coordinates, each the barycentric weight of a corner less 1/3.
 pub type Local = (f64, f64);
 
+/// The quarters of a node that still wait while a tree is walked.
+const WAITING: usize = Path::DEEPEST as usize * (QUARTERS - 1) + 1;
+
+/// Calls `leaf` with (facet, node, path) of every element, by facet, first quarters first. `child` gives a node's first
+/// quarter, `None` for an element. False where `leaf` says so or the trees are deeper than can be.
+fn walk(
+    facets: usize,
+    child: impl Fn(usize) -> Option<usize>,
+    mut leaf: impl FnMut(usize, usize, Path) -> bool,
+) -> bool {
+    for facet in 0..facets {
+        let mut waiting = [(0usize, Path::default()); WAITING];
+        waiting.set(0, (facet, Path::default()));
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let (node, path) = waiting.at(count);
+            match child(node) {
+                None if !leaf(facet, node, path) => return false,
+                None => {}
+                Some(_) if path.depth() >= Path::DEEPEST => return false,
+                Some(first) => {
+                    for quarter in (0..QUARTERS).rev() {
+                        waiting.set(count, (first + quarter, path.step(quarter)));
+                        count += 1;
+                    }
+                }
+            }
+        }
+    }
+    true
+}
+
 impl<'m> Elements<'m> {
-    /// Bytes for facets cut as `divisions` says.
-    pub fn bytes(divisions: &[u32]) -> Result<usize, Error> {
-        let elements = count(divisions)?;
-        let facets = divisions.len();
-        Need::new().and::<u32>(facets + 1).and::<u32>(facets).and::<u32>(elements).and::<f32>(facets).bytes()
+    /// Bytes for facets cut like this.
+    pub fn bytes(cut: &Cut<'_>) -> Result<usize, Error> {
+        let leaves = cut.nodes().iter().filter(|n| n.child == 0).count();
+        Elements::need(cut.facets(), cut.nodes().len(), leaves).bytes()
     }
 
-    /// Cuts each facet's edges into `divisions` parts (1 to [`MAX_DIVISIONS`]; degenerate facets: 1).
-    ///
-    /// `unevenness` is what [`crate::subdivide::probe`] found, by facet; empty: nothing is known of it.
-    pub fn new(
-        scene: &Scene<'_>,
-        divisions: &[u32],
-        unevenness: &[f64],
-        memory: &'m mut [u8],
-    ) -> Result<Elements<'m>, Error> {
-        if divisions.len() != scene.facets() {
-            let (expected, given) = (scene.facets(), divisions.len());
-            return Err(Error::Length { what: "divisions", expected, given });
+    fn need(facets: usize, nodes: usize, elements: usize) -> Need {
+        Need::new().and::<u32>(facets + 1).and::<u32>(nodes).and::<u32>(elements).and::<u32>(elements)
+    }
+
+    /// The elements of a cut.
+    pub fn new(scene: &Scene<'_>, cut: &Cut<'_>, memory: &'m mut [u8]) -> Result<Elements<'m>, Error> {
+        let (facets, trees): (usize, &[Node]) = (cut.facets(), cut.nodes());
+        if facets != scene.facets() {
+            return Err(Error::Mismatch { what: "cut" });
         }
-        let needed = Elements::bytes(divisions)?;
-        let elements = count(divisions)?;
+        let needed = Elements::bytes(cut)?;
+        let elements = trees.iter().filter(|n| n.child == 0).count();
         let mut arena = Arena::new(memory, needed)?;
-        let first = arena.take::<u32>(divisions.len() + 1)?;
-        let kept = arena.take::<u32>(divisions.len())?;
-        let facet = arena.take::<u32>(elements)?;
-        let roughness = arena.take::<f32>(divisions.len())?;
-        for ((r, &v), &s) in roughness.iter_mut().zip(unevenness).zip(divisions) {
-            *r = sqrt((v / f64::from(s.max(1))).max(0.0)) as f32;
+        let first = arena.take::<u32>(facets + 1)?;
+        let nodes = arena.take::<u32>(trees.len())?;
+        let facet_of = arena.take::<u32>(elements)?;
+        let paths = arena.take::<u32>(elements)?;
+        for (node, tree) in nodes.iter_mut().zip(trees) {
+            *node = tree.child;
         }
+        let child = |node: usize| trees.get(node).map(|n| n.child as usize).filter(|c| *c != 0);
         let mut at = 0;
-        for (f, &s) in divisions.iter().enumerate() {
-            let s = s.clamp(1, MAX_DIVISIONS);
-            first.set(f, at as u32);
-            kept.set(f, s);
-            facet.part_mut(at..at + (s * s) as usize).fill(f as u32);
-            at += (s * s) as usize;
-        }
-        first.set(divisions.len(), at as u32);
-        Ok(Elements { first, divisions: kept, facet, roughness, sides: scene.sides(), memory: needed })
+        walk(facets, child, |facet, node, path| {
+            nodes.set(node, LEAF | at as u32);
+            facet_of.set(at, facet as u32);
+            paths.set(at, path.0);
+            at += 1;
+            first.set(facet + 1, at as u32);
+            true
+        });
+        Ok(Elements { first, nodes, facet: facet_of, path: paths, sides: scene.sides(), memory: needed })
     }
 
     /// Number of elements.
@@ -90,61 +123,49 @@ impl<'m> Elements<'m> {
     }
 
     /// The unknowns of one side of a facet.
-    pub fn unknowns_of(&self, facet: usize, side: usize) -> impl Iterator<Item = usize> + use<> {
+    pub fn unknowns_of(&self, facet: usize, side: usize) -> impl Iterator<Item = usize> + Clone + use<> {
         let sides = self.sides;
         (self.first.at(facet) as usize..self.first.at(facet + 1) as usize).map(move |e| e * sides + side)
     }
 
-    /// Share of its facet's area that each of a facet's elements has.
+    /// The unknowns of what was cut together with an unknown's element: the other quarters of one triangle, or what those
+    /// were cut into, some thirty at most.
+    pub fn neighbours(&self, unknown: usize) -> impl Iterator<Item = usize> {
+        let (sides, facet) = (self.sides.max(1), self.facet_of(unknown).0);
+        let own = Path(self.path.at(unknown / sides));
+        let (start, end) = (self.first.at(facet) as usize, self.first.at(facet + 1) as usize);
+        let at = unknown / sides;
+        (1..16)
+            .flat_map(move |step| [at.checked_sub(step), at.checked_add(step)])
+            .flatten()
+            .filter(move |e| (start..end).contains(e) && own.is_quarter_beside(Path(self.path.at(*e))))
+            .map(move |e| e * sides + unknown % sides)
+    }
+
+    /// Share of its facet's area that an unknown's element has.
     #[inline(always)]
-    pub fn share(&self, facet: usize) -> f64 {
-        let s = f64::from(self.divisions.at(facet));
-        1.0 / (s * s)
+    pub fn share(&self, unknown: usize) -> f64 {
+        Path(self.path.at(unknown / self.sides.max(1))).share()
     }
 
     /// The unknown at the point of barycentric weights (u, v) of a facet's side, and the point on its element.
     #[inline(always)]
     pub fn locate(&self, facet: usize, side: usize, u: f64, v: f64) -> (usize, Local) {
-        let s = self.divisions.at(facet);
-        let first = self.first.at(facet) as usize;
-        if s == 1 {
-            return (first * self.sides + side, (u - 1.0 / 3.0, v - 1.0 / 3.0));
+        let (mut node, mut point) = (self.nodes.at(facet), (u, v));
+        for _ in 0..Path::DEEPEST {
+            if node & LEAF != 0 {
+                break;
+            }
+            let (quarter, next) = quarter::into(point.0, point.1);
+            (node, point) = (self.nodes.at(node as usize + quarter), next);
         }
-        let n = f64::from(s);
-        let cell = |x: f64, end: u32| ((x * n) as u32).min(end); // the cast saturates at 0
-        let i = cell(u, s - 1);
-        let j = cell(v, s - 1 - i);
-        let (a, b) = (u * n - f64::from(i), v * n - f64::from(j));
-        let upper = a + b > 1.0 && i + j + 1 < s;
-        let element = first + (i * (2 * s - i) + 2 * j) as usize + usize::from(upper);
-        let (a, b) = if upper { (1.0 - a, 1.0 - b) } else { (a, b) };
-        (element * self.sides + side, (a - 1.0 / 3.0, b - 1.0 / 3.0))
+        ((node & !LEAF) as usize * self.sides + side, (point.0 - 1.0 / 3.0, point.1 - 1.0 / 3.0))
     }
 
     /// Barycentric weights in the facet of the point (a, b) (weights of corners 1 and 2) of an element.
     #[inline(always)]
     pub fn in_facet(&self, element: usize, a: f64, b: f64) -> (f64, f64) {
-        let facet = self.facet.at(element) as usize;
-        let s = self.divisions.at(facet);
-        let mut rest = element as u32 - self.first.at(facet);
-        let mut i = 0;
-        while i < s && rest >= 2 * (s - i) - 1 {
-            rest -= 2 * (s - i) - 1;
-            i += 1;
-        }
-        let (j, upper) = (rest / 2, rest % 2 == 1);
-        let n = f64::from(s);
-        if upper {
-            ((f64::from(i + 1) - a) / n, (f64::from(j + 1) - b) / n)
-        } else {
-            ((f64::from(i) + a) / n, (f64::from(j) + b) / n)
-        }
-    }
-
-    /// How far the blocked share of the hemisphere departs from linear functions over a facet's elements, rms.
-    #[inline(always)]
-    pub fn roughness(&self, facet: usize) -> f64 {
-        f64::from(self.roughness.at(facet))
+        Path(self.path.at(element)).out_of(a, b)
     }
 
     /// Corners of an element in scene coordinates, wound as its facet.
@@ -160,16 +181,6 @@ impl<'m> Elements<'m> {
     pub fn memory(&self) -> usize {
         self.memory
     }
-}
-
-fn count(divisions: &[u32]) -> Result<usize, Error> {
-    // two sides and the flag bit of a coupling record must fit into 32 bits
-    let limit = 1usize << 29;
-    let elements = divisions.iter().try_fold(0usize, |sum, &s| {
-        let s = s.clamp(1, MAX_DIVISIONS) as usize;
-        sum.checked_add(s * s).filter(|&sum| sum <= limit)
-    });
-    elements.ok_or(Error::TooMany { what: "elements", limit })
 }
 
 /// The point of barycentric weights `u`, `v` (corners 1 and 2) of a triangle.
@@ -199,25 +210,38 @@ mod tests {
         };
         let mut memory = [0u8; 4096];
         let scene = Scene::new(&input, &mut memory).unwrap();
-        for s in [1, 2, 5, 64] {
-            let mut memory = [0u8; 32768 + 4096];
-            let elements = Elements::new(&scene, &[s, 1], &[], &mut memory).unwrap();
-            assert_eq!(elements.count(), (s * s + 1) as usize);
-            let mut area = 0.0;
-            for e in 0..(s * s) as usize {
+        for cuts in [0, 1, 3, 6] {
+            let mut memory = [0u8; 1 << 18];
+            let mut cut = Cut::new(&scene, 1e-3, &mut memory).unwrap();
+            // the first facet and then always one corner and the middle of what was cut
+            for _ in 0..cuts {
+                let (_, values) = cut.work();
+                values
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(i, v)| *v = if i % 4 == 0 || i % 4 == 3 { 1.0 } else { 0.0 });
+                assert!(cut.refine(&scene));
+            }
+            let mut memory = [0u8; 1 << 16];
+            let elements = Elements::new(&scene, &cut, &mut memory).unwrap();
+            let own = elements.unknowns_of(0, 1).map(|u| u / 2);
+            assert_eq!(own.clone().count() + 1, elements.count());
+            let (mut area, mut share) = (0.0, 0.0);
+            for e in own {
                 for (a, b) in [(0.2, 0.3), (0.7, 0.1), (0.05, 0.9)] {
                     let (u, v) = elements.in_facet(e, a, b);
                     let (unknown, (la, lb)) = elements.locate(0, 1, u, v);
                     assert_eq!(elements.facet_of(unknown), (0, 1));
-                    assert_eq!(unknown, e * 2 + 1, "s {s}");
-                    // rounding of u * s with s <= 64
-                    assert!((la + 1.0 / 3.0 - a).abs() < 1e-12 && (lb + 1.0 / 3.0 - b).abs() < 1e-12);
+                    assert_eq!(unknown, e * 2 + 1, "{cuts} cuts");
+                    // rounding of weights near 1, doubled at each of six steps
+                    assert!((la + 1.0 / 3.0 - a).abs() < 1e-13 && (lb + 1.0 / 3.0 - b).abs() < 1e-13);
                 }
                 let [p, q, r] = elements.corners(&scene, e);
                 area += 0.5 * (q - p).cross(r - p).dot(scene.normals()[0]);
+                share += elements.share(e * 2);
             }
-            // a sum of s^2 terms rounds each time
-            assert!((area - scene.areas()[0]).abs() < f64::from(s * s) * f64::EPSILON);
+            // a sum of some hundred terms rounds each time
+            assert!((area - scene.areas()[0]).abs() < 1e-13 && (share - 1.0).abs() < 1e-15);
             for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (-1e-17, 1.0 + 1e-16)] {
                 let (unknown, _) = elements.locate(0, 0, u, v);
                 assert_eq!(elements.facet_of(unknown), (0, 0));

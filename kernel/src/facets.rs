@@ -26,7 +26,7 @@ pub fn side(
     for unknown in solved.elements.unknowns_of(facet, side) {
         let mean = solved.irradiance.get(shape.at(unknown, level)).unwrap_or(&[]);
         // what lies inside a body receives nothing
-        let share = solved.elements.share(facet) * f64::from(coupling.row(unknown).exposed);
+        let share = solved.elements.share(unknown) * f64::from(coupling.row(unknown).exposed);
         let lit = sun.get(unknown).copied().unwrap_or(0.0);
         for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
             let sun = solved.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));

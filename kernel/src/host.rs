@@ -8,6 +8,7 @@ mod report;
 
 pub use report::*;
 
+use crate::accuracy;
 use crate::arena::Memory;
 use crate::beam;
 use crate::bvh::Bvh;
@@ -27,7 +28,7 @@ use crate::scene::{Scene, SceneInput};
 use crate::signature::{self, Signature, Sums, View};
 use crate::simd::Isa;
 use crate::sky::{Sky, SkyInput};
-use crate::subdivide;
+use crate::subdivide::Cut;
 use crate::sun::{Sun, SunInput};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -98,7 +99,7 @@ pub struct Lit<'g> {
     reference: Vec<f64>,
     irradiance: Vec<f64>,
     sun: Vec<f64>,
-    noise: Vec<f32>,
+    variance: Vec<f32>,
     brightest: f64,
     report: Report,
 }
@@ -162,15 +163,21 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        let mut unevenness = std::vec![0.0; scene.facets()];
-        let probes = self.split(&mut unevenness, 1, |range, out| {
-            subdivide::probe(&scene, &bvh, policy::probing(&rows), range, out)
-        })?;
-        report.rays.visibility += probes.iter().sum::<u64>();
-        let mut divisions = std::vec![1u32; scene.facets()];
-        subdivide::divisions(&scene, &unevenness, settings.tolerance, &mut divisions)?;
-        *element_memory = Memory::new(Elements::bytes(&divisions)?);
-        let elements = Elements::new(&scene, &divisions, &unevenness, element_memory.bytes_mut())?;
+        let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
+        let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
+        let probing = policy::probing(&rows);
+        loop {
+            let (work, unevenness) = cut.work();
+            let probes = self.split(unevenness, 1, |range, out| {
+                work.probe(&scene, &bvh, probing, settings.tolerance, range, out)
+            })?;
+            report.rays.visibility += probes.iter().sum::<u64>();
+            if !cut.refine(&scene) {
+                break;
+            }
+        }
+        *element_memory = Memory::new(Elements::bytes(&cut)?);
+        let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
         let unmerged = policy::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
@@ -250,23 +257,50 @@ impl Host {
         }
         report.bytes.light = 8 * (direct.len() + lit_share.len());
         report.seconds.light = clock.lap();
-        let system = System {
-            scene,
-            elements,
-            coupling: &coupling,
-            light: &light,
-            direct: &direct,
-            sun: &lit_share,
-            shape,
-        };
-        let (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
+        let (coupling, light) = (&coupling, &light);
+        let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
+        let (mut irradiance, mut radiance) =
+            self.solve(&system, &geometry.settings, &reference, &mut report)?;
+        if shape.levels == 1 {
+            let mut missed = std::vec![0.0; unknowns * bands];
+            self.split(&mut missed, bands, |range, out| {
+                system.slopes(range, &irradiance, out);
+                Ok(())
+            })?;
+            light::add(&missed, shape, &mut direct);
+            let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
+            (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
+        }
         policy::check_radiance(&radiance, bands)?;
-        let contrast = policy::at_stake(&system, &reference, &radiance);
-        let noise = coupling.rows(0..unknowns).map(|(_, r)| policy::noise(&r.row, contrast)).collect();
-        let brightest = policy::brightest(scene, &light, &reference, &radiance);
+        let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
+        system.extend(&mut irradiance);
+        let variance = self.accuracy(&system, &radiance, &reference)?;
+        let brightest = policy::brightest(scene, light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
-        Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, noise, brightest, report })
+        let light = *light;
+        Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, variance, brightest, report })
+    }
+
+    /// Expected squared error of each unknown.
+    fn accuracy(&self, system: &System<'_>, radiance: &[f64], reference: &[f64]) -> Result<Vec<f32>, Error> {
+        let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
+        let mut differences = std::vec![0.0; unknowns * bands];
+        self.split(&mut differences, bands, |range, out| {
+            accuracy::differences(system, radiance, range, out)
+        })?;
+        let (mut carried, mut next) = (std::vec![0.0; unknowns * bands], std::vec![0.0; unknowns * bands]);
+        for _ in 0..accuracy::CARRIED {
+            self.split(&mut next, bands, |range, out| {
+                accuracy::carry(system, &differences, &carried, range, out)
+            })?;
+            core::mem::swap(&mut carried, &mut next);
+        }
+        let mut variance = std::vec![0.0; unknowns];
+        self.split(&mut variance, 1, |range, out| {
+            accuracy::rows(system, radiance, &carried, reference, range, out)
+        })?;
+        Ok(variance)
     }
 
     /// Adds the sunlight that mirrors throw to the irradiance table; returns the rays traced.
@@ -351,7 +385,7 @@ impl Host {
             core::mem::swap(radiance, &mut next);
             sweeps.took(changes.into_iter().fold(0.0, f64::max))?;
         }
-        report.sweeps = sweeps.done;
+        report.sweeps += sweeps.done;
         Ok(sweeps.error)
     }
 
@@ -491,7 +525,7 @@ impl Lit<'_> {
             light: &self.light,
             irradiance: &self.irradiance,
             shape: self.shape,
-            noise: &self.noise,
+            variance: &self.variance,
             reference: &self.reference,
             brightest: self.brightest,
             settings: policy::chains(settings.tolerance, settings.max_bounces),

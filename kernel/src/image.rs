@@ -7,7 +7,7 @@ use crate::camera::{Camera, Sampling};
 use crate::chain::{Sample, Solved, Terms};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy};
-use crate::math::{floor, pow, sqrt};
+use crate::math::{clamp, floor, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
@@ -49,7 +49,7 @@ impl Tally {
         if self.object_pixels == 0 {
             return 0.0;
         }
-        sqrt((self.noise2 + self.sampling2) / self.object_pixels as f64)
+        sqrt(((self.noise2 + self.sampling2) / self.object_pixels as f64).max(0.0))
     }
 }
 
@@ -73,7 +73,7 @@ fn work(bands: usize) -> usize {
     2 * lines::memory(3 * bands) + 3 * bands
 }
 
-/// Beside the three terms of a pixel's centre: object, noise, tail, sampled, unevenness.
+/// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
 const NOTES: usize = 5;
 
 /// Fewest and most rays through a pixel that is sampled by scattered rays.
@@ -163,6 +163,9 @@ pub fn rows(
     }
     Ok(painter.tally)
 }
+
+/// How far from a pixel's edges its rays stay, in pixels.
+const EDGE: f64 = 1e-6;
 
 struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
@@ -274,18 +277,19 @@ impl<'a> Painter<'a, '_> {
             copy(slot.part_mut(0..bands), &self.terms.diffuse);
             copy(slot.part_mut(bands..2 * bands), &self.terms.mirror_sky);
             copy(slot.part_mut(2 * bands..3 * bands), &self.terms.mirror_diffuse);
+            let variance = path.variance + path.noise * path.noise;
             let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
-            copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, path.noise, path.tail, sampled, 0.0]);
+            copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, variance, path.tail, sampled, 0.0]);
         }
     }
 
     /// Counts an object pixel and its expected errors.
     fn note(&mut self, at: usize) {
         let notes = at + self.stride - NOTES;
-        let [object, noise, tail] = [0, 1, 2].map(|i| self.lines.at(notes + i));
+        let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(notes + i));
         if object > 0.0 {
             self.tally.object_pixels += 1;
-            self.tally.noise2 += noise * noise;
+            self.tally.noise2 += variance;
             self.tally.tail = self.tally.tail.max(tail);
         }
     }
@@ -359,8 +363,8 @@ impl<'a> Painter<'a, '_> {
         let (solved, camera, measure) = (self.solved, self.camera, self.measure());
         let stride = measure.stride();
         let Painter { work, terms, tally, .. } = self;
-        let (outer, rest) = work.split_at_mut(lines::memory(stride));
-        let (inner, out) = rest.split_at_mut(lines::memory(stride));
+        let (outer, rest) = work.split_at_mut_checked(lines::memory(stride))?;
+        let (inner, out) = rest.split_at_mut_checked(lines::memory(stride))?;
         let seed = hash2(row as u32, column as u32);
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
@@ -373,6 +377,8 @@ impl<'a> Painter<'a, '_> {
             (places[0], places[PARTS]) = (0.0, 1.0);
             let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
             integrate(&measure, &Fineness { places: &places, goal, narrowest }, inner, out, &mut |x, slot| {
+                // a ray on the very edge may see what lies beyond it
+                let [x, y] = [x, y].map(|x| clamp(x, EDGE, 1.0 - EDGE));
                 let (x, y) = if along { (x, y) } else { (y, x) };
                 let ray = camera.ray(column as f64 + x, row as f64 + y);
                 terms.clear(measure.bands);

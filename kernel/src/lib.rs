@@ -60,6 +60,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![deny(unsafe_code)]
 
+pub mod accuracy;
 pub mod arena;
 pub mod bake;
 pub mod beam;
@@ -83,6 +84,7 @@ pub mod plane;
 pub mod policy;
 pub mod qmc;
 pub mod quadrature;
+pub mod quarter;
 pub mod radiosity;
 pub mod ray;
 pub mod scene;

@@ -240,9 +240,19 @@ pub fn sun_rows(
         }
         rays += u64::from(count);
         let share = if all > 0.0 { lit / all } else { 0.0 };
-        *value = cosine * (share / f64::from(row.row.exposed)).min(1.0);
+        let exposed = f64::from(row.row.exposed);
+        // inside a body: what falls there matters to nothing
+        *value = if exposed > 0.0 { cosine * (share / exposed).min(1.0) } else { 0.0 };
     }
     Ok(rays)
+}
+
+/// Adds irradiances (`bands` values an unknown) to the means in a table of one level.
+pub fn add(irradiance: &[f64], shape: Shape, table: &mut [f64]) {
+    for (unknown, to) in pieces(table, shape.stride()).enumerate() {
+        let from = irradiance.part(unknown * shape.bands..(unknown + 1) * shape.bands);
+        to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+    }
 }
 
 /// Checks a light's reference radiance given by the user: one positive finite value per band.

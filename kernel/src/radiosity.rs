@@ -3,7 +3,7 @@
 //! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
 //! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep.
 
-use crate::coupling::Coupling;
+use crate::coupling::{Coupling, TRACED};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut, copy, pieces, span};
@@ -140,6 +140,45 @@ impl System<'_> {
             damp(first, second, &square, row.row.rays);
         }
         Ok(())
+    }
+
+    /// What the rows of `range` miss where they take an element's radiance for the same all over it: irradiance by the
+    /// slopes of what all unknowns send, written to `out`, one value per band. `irradiance` is the gathered table.
+    pub fn slopes(&self, range: Range<usize>, irradiance: &[f64], out: &mut [f64]) {
+        let bands = self.shape.bands;
+        for ((_, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
+            out.fill(0.0);
+            for record in row.targets {
+                let seen = irradiance.part(self.shape.at(record.unknown(), 0));
+                let diffuse = self.scene.diffuse(self.material(record.unknown()));
+                let (first, second) = (seen.part(bands..2 * bands), seen.part(2 * bands..3 * bands));
+                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record));
+                for (out, (((a, b), rho), product)) in out.iter_mut().zip(slopes) {
+                    let [at, bt] = record.moment.map(f64::from);
+                    *out += product * rho * (a * at + b * bt);
+                }
+            }
+        }
+    }
+
+    /// Gives elements that lie inside a body, as far as their rays can tell, the irradiance of a neighbour, in the
+    /// gathered table: a sliver of them may show at the body's edge.
+    pub fn extend(&self, table: &mut [f64]) {
+        for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
+            if row.row.state < TRACED || row.row.exposed > 0.0 {
+                continue;
+            }
+            let near = self.elements.neighbours(unknown).find(|&near| self.coupling.row(near).exposed > 0.0);
+            let Some(near) = near else { continue };
+            for level in 0..self.shape.levels {
+                let (to, from) = (self.shape.at(unknown, level), self.shape.at(near, level));
+                for (band, (to, from)) in to.zip(from).enumerate() {
+                    // the neighbour's mean; its slopes end at its edge
+                    let value = if band < self.shape.bands { table.at(from) } else { 0.0 };
+                    table.set(to, value);
+                }
+            }
+        }
     }
 
     /// Diffuse radiance that the irradiance on one level makes, for the rows of `range`.

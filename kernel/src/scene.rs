@@ -265,6 +265,11 @@ impl<'m> Scene<'m> {
         Scene::largest(self.diffuse)
     }
 
+    /// Largest diffuse reflectance of a facet over the bands.
+    pub fn largest_diffuse_of(&self, facet: usize) -> f64 {
+        Scene::largest(self.diffuse(self.material(facet)))
+    }
+
     /// Largest mirror reflectance of the scene.
     pub fn largest_specular(&self) -> f64 {
         Scene::largest(self.specular)

@@ -21,7 +21,7 @@ use blik_kernel::scene::{MAX_BANDS, Scene, SceneInput};
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyInput};
-use blik_kernel::subdivide;
+use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
 use std::ops::Range;
 
@@ -62,8 +62,7 @@ pub struct Workspace {
     elements: Vec<u8>,
     blocks: Vec<Vec<u8>>,
     beams: Vec<Vec<u8>>,
-    unevenness: Vec<f64>,
-    divisions: Vec<u32>,
+    trees: Vec<u8>,
     pub tables: Tables,
     pub view: Outputs,
 }
@@ -72,7 +71,7 @@ pub struct Workspace {
 pub struct Tables {
     direct: Vec<f64>,
     next: Vec<f64>,
-    noise: Vec<f32>,
+    variance: Vec<f32>,
     /// Mean of cos V of the sun for each unknown.
     pub sun: Vec<f64>,
     /// Diffuse radiance of each unknown, each band.
@@ -99,13 +98,13 @@ impl Workspace {
             elements: vec![0xa5; 4 * (unknowns + 4 * facets) + 1024],
             blocks: vec![vec![0xa5; block]; PARTS],
             beams: vec![vec![0xa5; block]; PARTS],
-            unevenness: vec![f64::NAN; facets],
-            divisions: vec![0; facets],
+            // trees of quarters, at the tightest tolerance of these tests
+            trees: vec![0xa5; Cut::bytes(facets, 5e-4).unwrap()],
             tables: Tables {
                 direct: vec![f64::NAN; 3 * bands * unknowns],
                 next: vec![f64::NAN; bands * unknowns],
                 // this part of the estimate is not compared
-                noise: vec![0.0; unknowns],
+                variance: vec![0.0; unknowns],
                 sun: vec![f64::NAN; unknowns],
                 radiance: vec![f64::NAN; bands * unknowns],
                 irradiance: vec![f64::NAN; 3 * bands * unknowns],
@@ -190,13 +189,19 @@ pub fn run(
 
     let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
     let probing = policy::probing(&settings);
-    split(parts, scene.facets(), 1, &mut work.unevenness, |range, out| {
-        counts.visibility += subdivide::probe(&scene, &bvh, probing, range, out)?;
-        Ok(())
-    })?;
-    subdivide::divisions(&scene, &work.unevenness, plan.tolerance, &mut work.divisions)?;
-    let bytes = Elements::bytes(&work.divisions)?;
-    let elements = Elements::new(&scene, &work.divisions, &work.unevenness, &mut work.elements[..bytes])?;
+    let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
+    loop {
+        let (fresh, unevenness) = cut.work();
+        split(parts, fresh.len(), 1, unevenness, |range, out| {
+            counts.visibility += fresh.probe(&scene, &bvh, probing, plan.tolerance, range, out)?;
+            Ok(())
+        })?;
+        if !cut.refine(&scene) {
+            break;
+        }
+    }
+    let bytes = Elements::bytes(&cut)?;
+    let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
     let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
         rows::fill(&scene, &bvh, &elements, &settings, range, memory)
@@ -278,18 +283,57 @@ impl Stage<'_> {
     /// Radiances and irradiances; returns the largest radiance that a ray can see over the reference.
     fn solve(&self, tables: &mut Tables, counts: &mut Counts) -> Result<f64, Error> {
         let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
-        let stride = self.shape.stride();
-        let system = System {
+        let (rows, stride) = (unknowns * bands, self.shape.stride());
+        let Tables { direct, sun, radiance, next, irradiance, .. } = tables;
+        let (direct, irradiance) = (&mut direct[..unknowns * stride], &mut irradiance[..unknowns * stride]);
+        self.sweeps(
+            direct,
+            &sun[..unknowns],
+            [&mut radiance[..rows], &mut next[..rows]],
+            irradiance,
+            counts,
+        )?;
+        let missed = &mut next[..rows];
+        let system = self.system(direct, &sun[..unknowns]);
+        split(parts, unknowns, bands, missed, |range, out| {
+            system.slopes(range, irradiance, out);
+            Ok(())
+        })?;
+        light::add(missed, self.shape, direct);
+        self.sweeps(
+            direct,
+            &sun[..unknowns],
+            [&mut radiance[..rows], &mut next[..rows]],
+            irradiance,
+            counts,
+        )?;
+        self.system(direct, &sun[..unknowns]).extend(irradiance);
+        Ok(policy::brightest(self.scene, self.light, self.reference, &radiance[..rows]))
+    }
+
+    fn system<'b>(&'b self, direct: &'b [f64], sun: &'b [f64]) -> System<'b> {
+        System {
             scene: self.scene,
             elements: self.elements,
             coupling: self.coupling,
             light: self.light,
-            direct: &tables.direct[..unknowns * stride],
-            sun: &tables.sun[..unknowns],
+            direct,
+            sun,
             shape: self.shape,
-        };
-        let mut from = &mut tables.radiance[..unknowns * bands];
-        let mut to = &mut tables.next[..unknowns * bands];
+        }
+    }
+
+    /// Sweeps to the end, and gathers; the radiances stand in the first of both tables then.
+    fn sweeps(
+        &self,
+        direct: &[f64],
+        sun: &[f64],
+        [mut from, mut to]: [&mut [f64]; 2],
+        irradiance: &mut [f64],
+        counts: &mut Counts,
+    ) -> Result<(), Error> {
+        let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
+        let system = self.system(direct, sun);
         split(parts, unknowns, bands, from, |range, out| {
             system.start(range, out);
             Ok(())
@@ -297,22 +341,22 @@ impl Stage<'_> {
         let q = system.contraction(0..unknowns);
         let goal = 1e-3 * self.plan.tolerance;
         let most = sweeps(q, goal) + 200;
-        let mut error = f64::INFINITY;
-        while error > goal && counts.sweeps < most {
+        let (mut error, mut done) = (f64::INFINITY, 0);
+        while error > goal && done < most {
             let mut change: f64 = 0.0;
             split(parts, unknowns, bands, to, |range, out| {
                 change = change.max(system.sweep(range, from, out, self.reference));
                 Ok(())
             })?;
             std::mem::swap(&mut from, &mut to);
-            counts.sweeps += 1;
+            done += 1;
             error = bound(change, q);
         }
+        counts.sweeps += done;
         to.copy_from_slice(from);
-        split(parts, unknowns, stride, &mut tables.irradiance[..unknowns * stride], |range, out| {
+        split(parts, unknowns, self.shape.stride(), irradiance, |range, out| {
             system.gather(range, 0, |_| from, out)
-        })?;
-        Ok(policy::brightest(self.scene, self.light, self.reference, from))
+        })
     }
 
     /// Image and signature.
@@ -332,7 +376,7 @@ impl Stage<'_> {
             light: self.light,
             irradiance: &tables.irradiance[..counts.unknowns * self.shape.stride()],
             shape: self.shape,
-            noise: &tables.noise[..counts.unknowns],
+            variance: &tables.variance[..counts.unknowns],
             reference: self.reference,
             brightest,
             settings: ChainSettings { cutoff: 0.05 * tolerance, max_bounces: None, tolerance },

@@ -68,7 +68,15 @@ pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
         pixels: image.pixels.iter().map(|&p| f64::from(p)).collect(),
         reference: lit.reference().to_vec(),
         irradiance: kernel::irradiances(&lit),
-        shares: (0..case.mesh.facets.len()).map(|f| geometry.elements().share(f)).collect(),
+        shares: (0..case.mesh.facets.len())
+            .map(|f| {
+                geometry
+                    .elements()
+                    .unknowns_of(f, 0)
+                    .map(|u| geometry.elements().share(u))
+                    .fold(1.0, f64::min)
+            })
+            .collect(),
         report: image.report,
         seconds,
         sampled: (rays > 0).then(|| pixels::compare(&lit, &case.camera, rays)).transpose()?,

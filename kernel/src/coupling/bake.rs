@@ -87,14 +87,13 @@ impl<'m> Block<'m> {
         let known = |r: &Record| (r.word() as usize) < self.words.len();
         let weighed = |r: &Record| {
             // gradients of a share of the hemisphere: 36 times it at most
-            (0.0..=1.0 + 1e-6).contains(&r.weight) && r.gradient.iter().all(|g| g.abs() <= 100.0)
+            (0.0..=1.0 + 1e-6).contains(&r.weight)
+                && r.gradient.iter().chain(&r.checks).chain(&r.moment).all(|g| g.abs() <= 100.0)
         };
         (ABSENT..=ENCLOSED).contains(&row.state)
             && (0.0..=1.0).contains(&row.exposed)
             && row.lost >= 0.0
             && row.lost.is_finite()
-            && row.spread >= 0.0
-            && row.spread.is_finite()
             && targets.iter().all(|r| !r.is_escape() && r.unknown() < unknowns && known(r) && weighed(r))
             && escapes.iter().all(|r| r.is_escape() && (known(r) || r.word() == BLOCKED) && weighed(r))
     }

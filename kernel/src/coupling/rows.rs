@@ -16,17 +16,19 @@ use crate::bvh::Bvh;
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, clamp, fabs, frame, pow, sqrt};
+use crate::math::{Vec3, clamp, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
-use crate::qmc::{Sequence, cosine_direction, hash, hash2, triangle};
+use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::quarter::{self, QUARTERS};
 use crate::scene::Scene;
+use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
 use core::ops::Range;
 
 /// What rows follow from the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowSettings {
-    /// Rays of a row whose hemisphere is half filled; a power of two.
+    /// Rays of a row of a facet of mean area whose hemisphere is half filled; a power of two.
     pub rays: u32,
     /// Chains end where the product of their mirrors falls below this.
     pub cutoff: f64,
@@ -38,39 +40,14 @@ pub struct RowSettings {
     pub all: bool,
 }
 
-/// Parts of an element: the triangles at its corners, and the middle one.
-const PARTS: usize = 4;
+/// Parts of an element: its quarters.
+const PARTS: usize = QUARTERS;
 
 /// Parts of the parts.
 const BINS: usize = PARTS * PARTS;
 
 /// The most rays of one row: each part's sequence has 2^16 points.
 pub const MOST_RAYS: u32 = (PARTS as u32) << 16;
-
-/// The point of weights (a, b) (corners 1 and 2) of a part, as weights of the element's corners.
-#[inline(always)]
-fn in_part(part: usize, (a, b): (f64, f64)) -> (f64, f64) {
-    match part {
-        0 => (0.5 * a, 0.5 * b),
-        1 => (0.5 + 0.5 * a, 0.5 * b),
-        2 => (0.5 * a, 0.5 + 0.5 * b),
-        _ => (0.5 - 0.5 * a, 0.5 - 0.5 * b),
-    }
-}
-
-/// The part in which the point of weights (a, b) lies.
-#[inline(always)]
-fn part_of(a: f64, b: f64) -> usize {
-    if a > 0.5 {
-        1
-    } else if b > 0.5 {
-        2
-    } else if a + b < 0.5 {
-        0
-    } else {
-        3
-    }
-}
 
 /// The gradients, in local coordinates, of the linear function through what the exposed parts see, by what each of
 /// them sees: through three corners; along the line of two, and the same across it; none.
@@ -87,13 +64,25 @@ fn slopes(open: [bool; PARTS]) -> [[f64; 2]; PARTS] {
     [0, 1, 2, 3].map(|part| if part < 3 && open[part] { [of(part, 0), of(part, 1)] } else { [0.0; 2] })
 }
 
-/// A part whose rays meet at least this share of black backs is inside a body (which need not be quite closed),
-/// where some other part of the element is not.
-const INSIDE: f64 = 0.9375;
+/// By what each exposed part counts in how far light departs from the linear function: the middle one beside the
+/// corners' mean; where some are not exposed, half the difference between two; none where one is all.
+fn departures(open: [bool; PARTS]) -> [f64; PARTS] {
+    if open == [true; PARTS] {
+        return [-1.0 / 3.0, -1.0 / 3.0, -1.0 / 3.0, 1.0];
+    }
+    let mut sign = if open.iter().filter(|&&o| o).count() > 1 { 0.5 } else { 0.0 };
+    open.map(|open| {
+        let own = if open { sign } else { 0.0 };
+        if open {
+            sign = if sign > 0.0 { -0.5 } else { 0.0 };
+        }
+        own
+    })
+}
 
-/// Weight of what elements do not resolve beside what their number of rays does not, in squares: so that some nine
-/// of ten images of the calibration's scenes err by less than estimated.
-const ROUGHNESS: f64 = 0.06;
+/// How many times the rays of a facet of mean area the largest and the smallest elements have.
+const MOST_FACTOR: f64 = 2.0;
+const LEAST_FACTOR: f64 = 0.25;
 
 /// The fewest rays of a row.
 const FEWEST: u32 = 64;
@@ -105,6 +94,11 @@ fn whole(rays: f64) -> u32 {
 }
 
 impl RowSettings {
+    /// The most rays of a row.
+    pub fn most_rays(&self) -> u32 {
+        whole(MOST_FACTOR * f64::from(self.rays))
+    }
+
     /// Settings for a tolerance: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
     /// kept at the tolerance.
     pub fn new(
@@ -141,7 +135,8 @@ pub fn fill(
     let given = memory.len();
     let sink = Sink::new(&range, scene.bands(), settings.directional, memory)?;
     let wanted = range.len();
-    let mut tracer = Tracer { scene, bvh, elements, settings, sink };
+    let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
+    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink };
     for unknown in range {
         if tracer.row(unknown).is_none() {
             tracer.sink.drop_row();
@@ -159,6 +154,7 @@ struct Tracer<'a, 'm> {
     bvh: &'a Bvh<'a>,
     elements: &'a Elements<'a>,
     settings: &'a RowSettings,
+    mean_area: f64,
     sink: Sink<'m>,
 }
 
@@ -177,10 +173,6 @@ struct Tally {
     rays: u32,
     chain_rays: u32,
     blocked: u32,
-    blocked_first_half: u32,
-    /// Sum over the first hits of a number in [0, 1) that each facet has: tells rows apart that are all blocked.
-    marks: f64,
-    marks_first_half: f64,
     lost: f64,
     /// Rays of each part's parts, and how many of them met a black back first.
     bins: [u32; BINS],
@@ -188,8 +180,8 @@ struct Tally {
 }
 
 impl Tally {
-    /// Which parts of the parts are not inside a body, and their rays; all where none is seen.
-    fn exposed(&self) -> ([bool; BINS], [u32; BINS]) {
+    /// Which parts of the parts are not inside a body, and their rays; all where none is seen, and then true.
+    fn exposed(&self) -> ([bool; BINS], [u32; BINS], bool) {
         let mut open = [true; BINS];
         for part in 0..PARTS {
             let of = |counts: &[u32; BINS], bin: usize| counts.at(part * PARTS + bin);
@@ -203,12 +195,13 @@ impl Tally {
                 open.set(part * PARTS + bin, !inside(backs, rays));
             }
         }
-        if open == [false; BINS] {
+        let hidden = open == [false; BINS];
+        if hidden {
             open = [true; BINS];
         }
         let mut exposed = self.bins;
         exposed.iter_mut().zip(open).filter(|(_, open)| !open).for_each(|(rays, _)| *rays = 0);
-        (open, exposed)
+        (open, exposed, hidden)
     }
 }
 
@@ -234,36 +227,34 @@ impl Tracer<'_, '_> {
             frame: frame(normal),
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
-        // an image sees a facet's elements side by side: their errors make up for each other
-        let uncut = self.elements.share(facet) == 1.0;
-        let most = if uncut { self.settings.rays } else { (self.settings.rays / 4).max(FEWEST) };
+        let most = self.most_rays(self.scene.areas()[facet] * self.elements.share(unknown));
         let mut tally = Tally::default();
         let mut goal = (most / 16).max(FEWEST).min(most);
         while tally.rays < goal {
-            if 2 * tally.rays == goal {
-                tally.blocked_first_half = tally.blocked;
-                tally.marks_first_half = tally.marks;
-            }
             self.ray(&start, &mut tally)?;
             tally.rays += 1;
             if tally.rays == goal {
                 goal = enough(most, goal, tally.blocked);
             }
         }
-        self.end_row(&tally, self.elements.roughness(facet));
+        self.end_row(&tally);
         Some(())
     }
 
+    /// Rays of an element of so much area: the image's mean square error, the sum of a n^-4/3 over all elements, is least
+    /// for a given number of rays where n goes with a^3/7.
+    fn most_rays(&self, area: f64) -> u32 {
+        let factor = clamp(pow(area / self.mean_area, 3.0 / 7.0), LEAST_FACTOR, MOST_FACTOR);
+        whole(factor * f64::from(self.settings.rays))
+    }
+
     /// Turns what the parts saw into the row.
-    fn end_row(&mut self, tally: &Tally, roughness: f64) {
-        let (open, exposed) = tally.exposed();
+    fn end_row(&mut self, tally: &Tally) {
+        let (open, exposed, hidden) = tally.exposed();
         let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
         let share = 1.0 / f64::from(tally.rays);
-        let halves = f64::from(tally.blocked) - 2.0 * f64::from(tally.blocked_first_half);
-        let marks = tally.marks - 2.0 * tally.marks_first_half;
-        let noise = fabs(halves).max(fabs(marks)) * share;
         // the lesser part of the hemisphere is kept
         let enclosed = self.settings.directional && 2 * (tally.blocked + seen - tally.rays) > seen;
         let dropped = if enclosed { BLOCKED } else { EMPTY };
@@ -271,12 +262,13 @@ impl Tracer<'_, '_> {
             state: if enclosed { ENCLOSED } else { TRACED },
             rays: tally.rays,
             chain_rays: tally.chain_rays,
-            exposed: (f64::from(seen) * share) as f32,
+            exposed: if hidden { 0.0 } else { (f64::from(seen) * share) as f32 },
             lost: tally.lost * share,
-            spread: sqrt(noise * noise + ROUGHNESS * roughness * roughness),
             ..Row::default()
         };
-        let slopes = slopes(counts.map(|count| count > 0));
+        let (slopes, departures) =
+            (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
+        let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen);
         self.sink.end_row(stats, |record| {
             let bin = record.gradient[0] as usize % BINS;
@@ -284,8 +276,16 @@ impl Tracer<'_, '_> {
                 return None;
             }
             let own = record.weight / f64::from(counts[bin / PARTS]);
-            let gradient = slopes[bin / PARTS].map(|slope| (slope * own) as f32);
-            Some(Record { weight: mean * record.weight, gradient, ..record })
+            let part = bin / PARTS;
+            let gradient = slopes[part].map(|slope| (slope * own) as f32);
+            let first = record.gradient[1] < first_half;
+            let difference = if first { mean * record.weight } else { -mean * record.weight };
+            let departure = 2.0 * departures[part] * own;
+            let split =
+                |value: f64, to_first: bool| if to_first { [value as f32, 0.0] } else { [0.0, value as f32] };
+            let ([a, b], [c, d]) = (split(difference, part < 2), split(departure, first));
+            let moment = record.moment.map(|m| mean as f32 * m);
+            Some(Record { weight: mean * record.weight, gradient, checks: [a, b, c, d], moment, ..record })
         });
     }
 
@@ -296,16 +296,16 @@ impl Tracer<'_, '_> {
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
         let (a, b) = triangle(p, q);
-        let bin = part * PARTS + part_of(a, b);
+        let bin = part * PARTS + quarter::into(a, b).0;
         tally.bins[bin] += 1;
-        let (a, b) = in_part(part, (a, b));
+        let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
         let (u, v) = self.elements.in_facet(start.element, a, b);
         let origin = Surface::new(self.scene, start.facet, start.side, u, v);
         let first = start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz;
         // stands for the gradient until the row ends
-        let mark = [bin as f32, 0.0];
+        let mark = [bin as f32, index as f32];
         let mut ray = origin.leave(first);
         let (mut word, mut weight) = (EMPTY, 1.0);
         loop {
@@ -317,14 +317,13 @@ impl Tracer<'_, '_> {
             };
             if word == EMPTY {
                 tally.blocked += 1;
-                tally.marks += number(hit.facet);
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
             }
             let Some(surface) = Surface::of_hit(self.scene, &hit) else {
                 tally.backs[bin] += u32::from(word == EMPTY);
                 return Some(());
             };
-            let (target, _) = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
+            let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
             if self.glows(surface.material) {
                 self.sink.push(Record::target(target, word, weight, mark))?;
             }
@@ -377,12 +376,6 @@ fn enough(most: u32, rays: u32, blocked: u32) -> u32 {
         goal *= 2;
     }
     goal
-}
-
-/// A number in [0, 1) that each facet has.
-#[inline(always)]
-fn number(facet: u32) -> f64 {
-    f64::from(hash(facet)) * (1.0 / 4_294_967_296.0)
 }
 
 /// The pair of coordinates that chooses the ray of the lobe number `depth` of a chain: the sequence's own pair

@@ -142,6 +142,9 @@ fn merge(row: &mut [Record]) -> usize {
                 last.weight += record.weight;
                 last.gradient[0] += record.gradient[0];
                 last.gradient[1] += record.gradient[1];
+                last.moment[0] += record.moment[0];
+                last.moment[1] += record.moment[1];
+                last.checks.iter_mut().zip(record.checks).for_each(|(to, from)| *to += from);
             }
             _ => {
                 row.set(kept, record);

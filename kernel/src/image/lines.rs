@@ -112,7 +112,8 @@ pub(super) fn integrate(
             if known >= 0.0 || error <= fineness.goal || width <= fineness.narrowest || top + 1 >= SLOTS {
                 out.iter_mut().zip(left).zip(right).for_each(|((o, l), r)| *o += 0.5 * width * (l + r));
                 error2 += error * error + 0.5 * width * width * (left2 + right2);
-                memory.copy_within(top * size..(top + 1) * size, 0);
+                let (first, rest) = memory.split_at_mut_checked(size)?;
+                copy(first, rest.part((top - 1) * size..top * size));
                 top -= 1;
                 continue;
             }
