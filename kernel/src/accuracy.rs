@@ -3,7 +3,8 @@
 //!
 //! Every row of the coupling was traced in two halves, from four quarters of its element. What both halves see of the
 //! solved radiances differs by their rays' noise; what the middle quarter sees beside the mean of the others is what
-//! the linear function over the element leaves out, and the product of both halves' values for it is free of noise's bias.
+//! the linear function over the element leaves out, and the product of both halves' values for it is free of noise's
+//! bias.
 //!
 //! The halves' differences go on from element to element as light does: in rooms that reflect much, small errors of
 //! all rows add up.
@@ -77,7 +78,8 @@ pub fn carry(
 }
 
 /// Expected squared error of the irradiance over pi of each unknown in `range`, relative to `reference`, in the band
-/// where it is largest: where noise is all there is, up to three times that. `radiance` is the solved diffuse radiance of all unknowns, `carried` what [`carry`] came to.
+/// where it is largest: where noise is all there is, up to three times that. `radiance` is the solved diffuse radiance
+/// of all unknowns, `carried` what [`carry`] came to.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.

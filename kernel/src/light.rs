@@ -107,7 +107,8 @@ impl Shape {
 /// `out` (the part of the table that belongs to the range).
 ///
 /// The unobstructed irradiance of the facet's plane, less what is blocked, plus what mirrors bring (where most is
-/// blocked, the sum over what is open): facets that nothing blocks get it to `relative_error`, and in a uniform sky the sum over targets and sky is exact.
+/// blocked, the sum over what is open): facets that nothing blocks get it to `relative_error`, and in a uniform sky the
+/// sum over targets and sky is exact.
 ///
 /// # Errors
 /// [`Error::Length`] for a table of the wrong size; [`Error::Mismatch`] where the sky is not uniform and the

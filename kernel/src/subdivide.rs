@@ -140,8 +140,8 @@ impl<'m> Cut<'m> {
     /// Quarters those of the probed triangles whose errors count most, and says whether there are new ones.
     ///
     /// A triangle's part of the mean square error over the object is a V rho^2 (its share a of the area, unevenness V).
-    /// Those with the least stay as they are, as long as their sum is within half of what is left of [`GOAL`] times the
-    /// tolerance's square.
+    /// Those with the least stay as they are, as long as their sum is within half of what is left of a small part of
+    /// the tolerance's square.
     pub fn refine(&mut self, scene: &Scene<'_>) -> bool {
         let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let range = self.fresh..self.used;
