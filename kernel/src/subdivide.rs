@@ -49,8 +49,6 @@ plain_struct! {
         pub path: u32,
         /// The first of its four quarters; 0: it is an element.
         pub child: u32,
-        /// Nothing.
-        pub unused: u32,
     }
 }
 
@@ -145,12 +143,15 @@ impl<'m> Cut<'m> {
     pub fn refine(&mut self, scene: &Scene<'_>) -> bool {
         let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let range = self.fresh..self.used;
+        let weight = |node: &Node| {
+            let rho = scene.largest_diffuse_of(node.facet as usize);
+            let share = Path(node.path).share() * scene.areas().at(node.facet as usize) / total;
+            share * rho * rho
+        };
         for (node, value) in
             self.nodes.iter().zip(self.unevenness.iter_mut()).take(self.used).skip(self.fresh)
         {
-            let rho = scene.largest_diffuse_of(node.facet as usize);
-            let share = Path(node.path).share() * scene.areas().at(node.facet as usize) / total;
-            *value = share * rho * rho * value.max(0.0);
+            *value = weight(node) * value.max(0.0);
         }
         let values = self.unevenness.part(range.clone());
         let elements = self.facets + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
@@ -164,12 +165,10 @@ impl<'m> Cut<'m> {
                 self.settled += value;
                 continue;
             }
-            let rho = scene.largest_diffuse_of(node.facet as usize);
-            let share = path.share() * scene.areas().at(node.facet as usize) / total;
             self.nodes.set(at, Node { child: self.used as u32, ..node });
             for quarter in 0..QUARTERS {
                 self.nodes.set(self.used, Node { path: path.step(quarter).0, child: 0, ..node });
-                self.unevenness.set(self.used, SMOOTH * value / (share * rho * rho));
+                self.unevenness.set(self.used, SMOOTH * value / weight(&node));
                 self.used += 1;
             }
         }
