@@ -235,7 +235,8 @@ fn no_sun_no_sun_rays_and_no_sky_no_light() {
     let case = Case::new(scenes::corner(2), &vec![Material::new(0.4, 0.4); 3]);
     let dark = case.run(2, &within(1e-2), &views()[1]);
     assert!(dark.image.pixels.iter().all(|&p| p == 0.0), "neither sky nor sun nor emission");
-    assert_eq!((dark.image.report.rays.sun, dark.image.report.error_estimate), (0, 0.0));
+    // what rounding to f32 may bring is always told
+    assert_eq!((dark.image.report.rays.sun, dark.image.report.error_estimate), (0, 1e-7));
     // the sun on facets that all face away costs no ray
     let away = case.sun(SunOf::new([-1.0, -1.0, -1.0], &[1.0], 0.2665)).run(2, &within(1e-2), &views()[1]);
     assert_eq!(away.image.report.rays.sun, 0);

@@ -33,6 +33,7 @@ fn baked(
         reference: s.tables.reference,
         irradiance: s.tables.irradiance,
         lit: s.tables.sun,
+        images: s.tables.images,
         variance: s.tables.variance,
         numbers: Numbers {
             brightest: s.tables.brightest,
@@ -201,12 +202,16 @@ pub unsafe extern "C" fn blik_load(
                     reference: own.reference,
                     irradiance: own.irradiance,
                     sun: own.lit,
+                    images: own.images,
                     variance: own.variance,
                     brightest: own.numbers.brightest,
                     solver: own.numbers.solver,
                     sweeps: own.numbers.sweeps as u32,
                     sun_rays: own.numbers.sun_rays,
-                    bytes: size_of_val(own.irradiance) + size_of_val(own.lit) + size_of_val(own.variance),
+                    bytes: size_of_val(own.irradiance)
+                        + size_of_val(own.lit)
+                        + size_of_val(own.variance)
+                        + own.images.memory(),
                 };
                 let shape = policy::shape(max_bounces, base.scene.bands());
                 solution_at.write(blik_solution::new(coupled, light, (own.sky, own.sun), tables, shape));

@@ -18,6 +18,7 @@ use blik_kernel::radiosity::System;
 use blik_kernel::scene::MAX_BANDS;
 use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
 use blik_kernel::sun::{Sun, SunInput};
+use blik_kernel::sun_image::{self, Noting, SunImages};
 use core::ffi::c_void;
 use core::ops::Range;
 
@@ -38,10 +39,11 @@ pub struct blik_solution {
 #[derive(Clone, Copy)]
 pub(crate) struct Tables {
     pub reference: &'static [f64],
-    /// Mean and gradients of each unknown's irradiance without the sun's direct part.
+    /// Mean and gradients of each unknown's irradiance without the sun's direct part and that of its images.
     pub irradiance: &'static [f64],
     /// Mean of cos V of the sun.
     pub sun: &'static [f64],
+    pub images: SunImages<'static>,
     pub variance: &'static [f32],
     pub brightest: f64,
     pub solver: f64,
@@ -92,6 +94,7 @@ impl blik_solution {
             elements: &self.coupling.elements,
             light: &self.light,
             irradiance: self.tables.irradiance,
+            images: self.tables.images,
             shape: self.shape,
             variance: self.tables.variance,
             reference: self.tables.reference,
@@ -210,6 +213,8 @@ struct Sizes {
     orders: usize,
     samples: usize,
     beams: usize,
+    /// Places for images of the sun, and values of what they throw.
+    images: (usize, usize),
 }
 
 impl Sizes {
@@ -222,16 +227,20 @@ impl Sizes {
             _ => 0,
         };
         let light = given.light(scene.bands())?;
-        let mut beams = 0;
+        let (mut beams, mut images) = (0, (0, 0));
+        let unknowns = coupling.elements.unknowns();
         if let Some(settings) = light.sun.as_ref().and_then(|sun| beam_settings(coupling, sun)) {
             beams = sink::bytes(16, 64, 2 * beam::most_rays(scene, &settings), scene.bands())?;
+            let sides = coupling.elements.facet_sides();
+            images = (sun_image::places(sides), unknowns * shape.levels * shape.bands);
         }
         Ok(Sizes {
             shape,
-            unknowns: coupling.elements.unknowns(),
+            unknowns,
             orders: if shape.levels == 1 { 2 } else { shape.levels + 1 },
             samples,
             beams,
+            images,
         })
     }
 
@@ -247,6 +256,8 @@ impl Sizes {
             .and::<f64>(self.unknowns)
             .and::<f64>(self.unknowns * self.shape.stride())
             .and::<f32>(self.unknowns)
+            .and::<u64>(self.images.0)
+            .and::<f64>(self.images.1)
     }
 
     /// What is needed to make it; the beams of each lane.
@@ -334,13 +345,15 @@ fn build(
     let sun = arena.take::<f64>(unknowns)?;
     let irradiance = arena.take::<f64>(unknowns * shape.stride())?;
     let variance = arena.take::<f32>(unknowns)?;
+    let (slots, thrown) = (arena.take::<u64>(sizes.images.0)?, arena.take::<f64>(sizes.images.1)?);
     let direct = arena.take::<f64>(unknowns * shape.stride())?;
     let orders = arena.take::<f64>(unknowns * shape.bands * sizes.orders)?;
     let scratch = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
 
     let matrix = coupling.matrix()?;
     let shine = Shine { coupling, matrix: &matrix, light: &light, shape };
-    let sun_rays = shine.direct(direct, sun, scratch, runner)?;
+    let mut noting = Noting { slots: &mut *slots, thrown: &mut *thrown };
+    let sun_rays = shine.direct(direct, sun, &mut noting, scratch, runner)?;
     let system = System { scene, elements, coupling: &matrix, light: &light, direct: &[], sun: &*sun, shape };
     let settings = &coupling.settings;
     let mut before = 0;
@@ -358,6 +371,8 @@ fn build(
     let solve = Solve { system: System { direct, ..system }, settings, reference };
     let (sweeps, radiance) = solve.run(orders, irradiance, runner)?;
     policy::check_radiance(radiance, shape.bands)?;
+    let images = SunImages { slots, thrown };
+    images.take_off(shape, elements.facet_sides(), |unknown| elements.facet_side(unknown), irradiance);
     system.extend(irradiance);
     // three values of each band in one level at least
     errors(&system, radiance, reference, direct, variance, runner)?;
@@ -365,6 +380,7 @@ fn build(
         reference,
         irradiance,
         sun,
+        images,
         variance,
         brightest: policy::brightest(scene, &light, reference, radiance),
         solver: sweeps.map_or(0.0, |s| s.error),
@@ -430,6 +446,7 @@ impl Shine<'_> {
         &self,
         direct: &mut [f64],
         lit: &mut [f64],
+        images: &mut Noting<'_>,
         scratch: &mut [u8],
         runner: &mut Runner,
     ) -> Result<u64, blik_error> {
@@ -449,7 +466,7 @@ impl Shine<'_> {
         })?;
         let traced = rays.into_inner();
         match beam_settings(self.coupling, sun) {
-            Some(settings) => Ok(traced + self.beams(sun, &settings, direct, scratch, runner)?),
+            Some(settings) => Ok(traced + self.beams(sun, &settings, (direct, images), scratch, runner)?),
             None => Ok(traced),
         }
     }
@@ -460,7 +477,7 @@ impl Shine<'_> {
         &self,
         sun: &Sun<'_>,
         settings: &BeamSettings,
-        direct: &mut [f64],
+        (direct, images): (&mut [f64], &mut Noting<'_>),
         scratch: &mut [u8],
         runner: &mut Runner,
     ) -> Result<u64, blik_error> {
@@ -506,7 +523,7 @@ impl Shine<'_> {
                 let memory = unsafe { core::slice::from_raw_parts(start.at(lane * part), part) };
                 let block = [Block::open(memory)?];
                 let thrown = Coupling::part(&block);
-                beam::add(&thrown, self.matrix, sun, self.shape, direct);
+                beam::add(&thrown, (self.matrix, elements), sun, self.shape, direct, images);
                 let rays = |r: &blik_kernel::coupling::Row| u64::from(r.rays) + u64::from(r.chain_rays);
                 traced +=
                     thrown.rows(wanted.start..wanted.start + done).map(|(_, r)| rays(&r.row)).sum::<u64>();

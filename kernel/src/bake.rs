@@ -21,9 +21,10 @@ use crate::scene::{MAX_BANDS, Scene};
 use crate::simd::Isa;
 use crate::sky::{Sky, SkyInput, SkyModel, SkyTable};
 use crate::sun::{Sun, SunInput};
+use crate::sun_image::{self, SunImages};
 
 /// Version of the layout; another one is refused.
-pub const VERSION: u64 = 1;
+pub const VERSION: u64 = 2;
 
 /// "BLIKBAKE"; its bytes tell the byte order.
 const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");
@@ -77,10 +78,12 @@ pub struct Solution<'m> {
     pub sun: Option<SunInput<'m>>,
     /// Reference radiance of each band.
     pub reference: &'m [f64],
-    /// Mean and gradients of each unknown's irradiance without the sun's direct part.
+    /// Mean and gradients of each unknown's irradiance without the sun's direct part and that of its images.
     pub irradiance: &'m [f64],
     /// Mean of cos V of the sun of each unknown.
     pub lit: &'m [f64],
+    /// Images of the sun in flat mirrors.
+    pub images: SunImages<'m>,
     /// Expected squared error of each unknown.
     pub variance: &'m [f32],
     /// Numbers.
@@ -120,6 +123,8 @@ plain_struct! {
         pub sun_direction: [f64; 3],
         /// Half angle of the sun.
         pub half_angle_deg: f64,
+        /// 1 where mirrors throw sunlight.
+        pub images: u64,
     }
 }
 
@@ -328,6 +333,7 @@ impl<'m> Solution<'m> {
         if let Some(sun) = &self.sun {
             (head.sun, head.sun_direction, head.half_angle_deg) = (1, sun.direction, sun.half_angle_deg);
         }
+        head.images = u64::from(!self.images.slots.is_empty());
         writer.put(&[head])?;
         put_bands(writer, radiance, bands)?;
         put_bands(writer, ground, bands)?;
@@ -337,7 +343,9 @@ impl<'m> Solution<'m> {
         writer.put(self.reference)?;
         writer.put(self.irradiance)?;
         writer.put(self.lit)?;
-        writer.put(self.variance)
+        writer.put(self.variance)?;
+        writer.put(self.images.slots)?;
+        writer.put(self.images.thrown)
     }
 
     fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: Shape) -> Result<Solution<'m>, Error> {
@@ -381,7 +389,14 @@ impl<'m> Solution<'m> {
         let reference = view.take::<f64>(bands)?;
         let irradiance = view.take::<f64>(unknowns.checked_mul(shape.stride()).ok_or(Error::Block)?)?;
         let (lit, variance) = (view.take::<f64>(unknowns)?, view.take::<f32>(unknowns)?);
-        let solution = Solution { sky, sun, reference, irradiance, lit, variance, numbers };
+        let mut images = SunImages::default();
+        if head.images != 0 {
+            let sides = elements.facet_sides();
+            let slots = view.take::<u64>(sun_image::places(sides))?;
+            let thrown = view.take::<f64>(unknowns * shape.levels * bands)?;
+            images = SunImages::new(slots, thrown, sides, unknowns, shape)?;
+        }
+        let solution = Solution { sky, sun, reference, irradiance, lit, images, variance, numbers };
         solution.check()?;
         Ok(solution)
     }
@@ -392,6 +407,7 @@ impl<'m> Solution<'m> {
         // irradiance: pi times the largest radiance, gradients some times that
         let right = self.irradiance.iter().all(|x| x.abs() <= 1e40)
             && self.lit.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
+            && self.images.thrown.iter().all(|x| (0.0..=1e40).contains(x))
             && self.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))
             && self.reference.iter().all(|x| (0.0..=1e38).contains(x))
             && positive(&self.numbers.brightest)

@@ -4,6 +4,7 @@
 //! arrives at a diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row =
 //! facet * sides + side of the mirror, target = unknown, weight = irradiance per unit of the sun's normal
 //! irradiance. Energy is conserved: the weights times the targets' areas add up to the flux that leaves.
+//! A record also tells where the sun seems to stand ([`crate::sun_image`]), so that images need not take these means.
 //! Error of an element that receives n of the rays: about n^-3/4 of its value.
 
 use crate::bvh::Bvh;
@@ -15,11 +16,12 @@ use crate::element::Elements;
 use crate::error::Error;
 use crate::index::Index;
 use crate::light::Shape;
-use crate::math::{Vec3, clamp};
+use crate::math::{Vec3, clamp, reflect};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{NO_MIRROR, Scene};
 use crate::sun::Sun;
+use crate::sun_image::{Noting, pack};
 use core::ops::Range;
 
 /// What beams follow from the tolerance.
@@ -104,7 +106,7 @@ impl Tracer<'_, '_> {
         let (facet, side) = (row / self.scene.sides().max(1), row % self.scene.sides().max(1));
         let area = seen_area(self.scene, self.sun, facet, side);
         if area <= 0.0 {
-            self.sink.end_row(Row::default(), Some);
+            self.sink.end_row(Row::default(), Some, Record::join_beam);
             return Some(());
         }
         let wanted = clamp(area * self.settings.density, RAYS.0, RAYS.1);
@@ -115,7 +117,8 @@ impl Tracer<'_, '_> {
             self.ray(facet, side, &sequence, index, &mut stats)?;
         }
         let share = 1.0 / f64::from(rays);
-        self.sink.end_row(stats, |record| Some(Record { weight: share * record.weight, ..record }));
+        let finish = |record: Record| Some(Record { weight: share * record.weight, ..record });
+        self.sink.end_row(stats, finish, Record::join_beam);
         Some(())
     }
 
@@ -139,6 +142,8 @@ impl Tracer<'_, '_> {
         // flux per unit of normal irradiance, the first cosine still to come
         let (mut flux, mut word, mut arrival) = (scene.areas().at(facet), EMPTY, None);
         let mut direction = -toward;
+        // the way of the light of the sun's middle, as long as flat mirrors turn it
+        let mut axis = (!scene.is_smooth()).then_some(-self.sun.direction());
         loop {
             let Some(mirror) = surface.mirror(scene) else { return Some(()) };
             let depth = self.sink.words.get(word).depth;
@@ -153,6 +158,7 @@ impl Tracer<'_, '_> {
             if self.sink.words.largest(word) < self.settings.cutoff {
                 return Some(());
             }
+            axis = axis.filter(|_| mirror.lobe.is_none()).map(|axis| reflect(axis, surface.normal));
             let (s, t) = lobe_point(sequence, index, depth);
             let (leaving, share) = surface.go_on(scene, &mirror, direction, s, t);
             flux *=
@@ -165,7 +171,8 @@ impl Tracer<'_, '_> {
             arrival = Some(direction);
             let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
             let area = scene.areas().at(surface.facet) * self.elements.share(target.0);
-            self.sink.push(Record::target(target, word, flux / area, [0.0; 2]))?;
+            let image = axis.map_or(0, |axis| pack(-axis));
+            self.sink.push(Record::beam(target, word, flux / area, image))?;
         }
     }
 }
@@ -182,19 +189,34 @@ fn turned(normal: Vec3, leaving: Vec3, arrival: Option<Vec3>, flat: bool) -> f64
     }
 }
 
-/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors; what falls on an element
-/// falls on the part of it that is not inside a body.
-pub fn add(beams: &Coupling<'_>, coupling: &Coupling<'_>, sun: &Sun<'_>, shape: Shape, table: &mut [f64]) {
+/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors, and notes which suns they come
+/// from; what falls on an element falls on the part of it that is not inside a body.
+pub fn add(
+    beams: &Coupling<'_>,
+    (coupling, elements): (&Coupling<'_>, &Elements<'_>),
+    sun: &Sun<'_>,
+    shape: Shape,
+    table: &mut [f64],
+    images: &mut Noting<'_>,
+) {
     for (_, row) in beams.rows(0..beams.unknowns()) {
         for record in row.targets {
-            let exposed = f64::from(coupling.row(record.unknown()).exposed);
+            let (unknown, image) = (record.unknown(), record.image());
+            if image != 0 {
+                images.note(elements.facet_sides(), elements.facet_side(unknown), image);
+            }
+            let exposed = f64::from(coupling.row(unknown).exposed);
             if exposed == 0.0 {
                 continue;
             }
             for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record), l)) {
-                let Some(mean) = table.get_mut(shape.at(record.unknown(), level)) else { continue };
+                let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
                 for (band, (e, product)) in mean.iter_mut().zip(row.products(record)).enumerate() {
-                    *e += sun.irradiance(band) * product * (record.weight / exposed);
+                    let irradiance = sun.irradiance(band) * product * (record.weight / exposed);
+                    *e += irradiance;
+                    if image != 0 {
+                        images.add(shape, (unknown, level), band, irradiance);
+                    }
                 }
             }
         }

@@ -1,16 +1,18 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
 
+mod sunlight;
+
 use crate::bvh::Bvh;
 use crate::element::Elements;
 use crate::index::{Index, IndexMut};
 use crate::light::{Light, Shape};
-use crate::math::{FRAC_1_PI, Vec3, floor, pow, sqrt};
+use crate::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::mirror::{Mirror, Surface};
 use crate::qmc::{Sequence, hash2};
 use crate::ray::Ray;
 use crate::scene::{MAX_BANDS, Scene};
-use crate::sun::Sun;
+use crate::sun_image::SunImages;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,8 +36,10 @@ pub struct Solved<'a> {
     pub elements: &'a Elements<'a>,
     /// The light.
     pub light: &'a Light<'a>,
-    /// Irradiance without the sun's direct part: mean and gradients of each element side.
+    /// Irradiance without the sun's direct part and that of its images: mean and gradients of each element side.
     pub irradiance: &'a [f64],
+    /// Images of the sun in flat mirrors; what they throw is not in `irradiance`.
+    pub images: SunImages<'a>,
     /// Shape of `irradiance`.
     pub shape: Shape,
     /// Expected squared error of each unknown's irradiance over pi, relative to the reference radiance.
@@ -181,13 +185,6 @@ struct Leg {
     /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
     lobe: bool,
 }
-
-/// Rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them agree,
-/// these are enough.
-const DISC_RAYS: (u32, u32) = (16, 4);
-
-/// The most rays toward the sun's disc.
-const MOST_DISC_RAYS: u32 = 1024;
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
 const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
@@ -433,6 +430,9 @@ impl Solved<'_> {
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
         let sunlit = self.sun_cosine(leg, surface, sample, path);
+        if !self.images.slots.is_empty() {
+            self.add_images(leg, surface, sample, to, path);
+        }
         let mut weight = 0.0;
         for (band, ((to, through), rho)) in to.iter_mut().zip(&leg.through).zip(diffuse).enumerate() {
             let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
@@ -447,73 +447,5 @@ impl Solved<'_> {
             weight = f64::max(weight, share);
         }
         path.variance += weight * weight * f64::from(self.variance.at(unknown));
-    }
-
-    /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
-    #[inline]
-    fn sun_cosine(&self, leg: &Leg, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
-        let Some(sun) = &self.light.sun else { return 0.0 };
-        let cosine = sun.cosine(surface.normal);
-        if cosine <= 0.0 {
-            return 0.0;
-        }
-        if sun.is_point() {
-            path.rays += 1;
-            let shadow = self.bvh.occluded(&surface.leave(sun.direction()));
-            return if shadow { 0.0 } else { cosine };
-        }
-        // other coordinates than those of the place in the pixel: the same ones of another sequence are correlated with
-        // them bit by bit
-        let (sequence, coordinate, mut count, mut goal) = match sample {
-            Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
-            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.0),
-            Sample::Glance(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.1),
-        };
-        let (mut lit, mut all) = (0.0, 0.0);
-        while count < goal {
-            let (u, v) = sequence.pair(count, coordinate);
-            let toward = sun.sample(u, v);
-            let share = sun.share(toward, surface.normal);
-            count += 1;
-            if share > 0.0 {
-                all += share;
-                path.rays += 1;
-                lit += if self.bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
-            }
-            if count == goal && lit != 0.0 && lit != all {
-                path.sampled = true;
-                if matches!(sample, Sample::Alone(_)) && count < MOST_DISC_RAYS {
-                    let part = lit / all;
-                    let error = sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
-                    let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
-                    goal *= if error * at_stake > self.settings.tolerance { 2 } else { 1 };
-                }
-            }
-        }
-        if all > 0.0 { cosine * (lit / all) } else { 0.0 }
-    }
-
-    /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
-    fn sun_at_stake(&self, leg: &Leg, surface: &Surface, sun: &Sun<'_>) -> f64 {
-        let diffuse = self.scene.diffuse(surface.material);
-        let mut largest: f64 = 0.0;
-        for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
-            let value = FRAC_1_PI * rho * leg.through.at(band) * sun.irradiance(band);
-            largest = if value > 0.0 { largest.max(value / reference) } else { largest };
-        }
-        largest
-    }
-
-    /// The sun in a lobe, evaluated directly: E q(sun, view) V.
-    fn add_sun_gloss(&self, leg: &Leg, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
-        let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
-        let toward: Vec3 = sun.direction();
-        if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
-            return;
-        }
-        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
-        let value = lobe.value(mirrored.dot(toward));
-        let own = terms.mirror_sky.iter_mut().zip(&leg.through).take(self.shape.bands);
-        own.enumerate().for_each(|(band, (to, through))| *to += through * sun.irradiance(band) * value);
     }
 }

@@ -14,14 +14,15 @@ use crate::arena::{View, plain_struct};
 use crate::element::Local;
 use crate::error::Error;
 use crate::index::Index;
-use crate::math::{Vec3, fabs};
+use crate::math::Vec3;
+use crate::octahedron;
 use core::ops::Range;
 use word::Word;
 
 plain_struct! {
     /// One term of a row. The gradient is how the weight varies over the element, in local coordinates.
     pub struct Record {
-        /// Bit 63: an escape; bits 16..: target unknown or direction; bits 0..16: word.
+        /// Bit 63: an escape; bits 16..: target unknown (32 bits) or direction; bits 0..16: word.
         pub key: u64,
         /// Share of the cosine hemisphere, mean over the element.
         pub weight: f64,
@@ -104,7 +105,7 @@ impl Record {
     /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
     #[inline(always)]
     pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
-        let packed = direction.map_or(0, pack);
+        let packed = direction.map_or(0, octahedron::pack::<BITS>);
         Record {
             key: ESCAPE | packed << 16 | u64::from(word),
             weight,
@@ -129,40 +130,55 @@ impl Record {
     /// The target unknown.
     #[inline(always)]
     pub fn unknown(&self) -> usize {
-        (self.key >> 16) as usize
+        (self.key >> 16) as u32 as usize
+    }
+
+    /// A target on which the sun shines from the direction `image` ([`crate::sun_image::pack`]; 0: by lobes or curved
+    /// mirrors).
+    pub fn beam((unknown, _): (usize, Local), word: u16, weight: f64, image: u64) -> Record {
+        // records of different images stay apart
+        let apart = image.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 50;
+        let checks = [48, 32, 16, 0].map(|shift| f32::from((image >> shift) as u16));
+        let key = (unknown as u64 | apart << 32) << 16 | u64::from(word);
+        Record { key, weight, gradient: [0.0; 2], checks, moment: [0.0; 2] }
+    }
+
+    /// The image of a beam.
+    pub fn image(&self) -> u64 {
+        self.checks.iter().fold(0, |image, part| image << 16 | *part as u64)
+    }
+
+    /// Adds up what two rays of a row found.
+    #[inline(always)]
+    pub fn join(&mut self, record: &Record) -> bool {
+        if self.key != record.key {
+            return false;
+        }
+        self.weight += record.weight;
+        self.gradient[0] += record.gradient[0];
+        self.gradient[1] += record.gradient[1];
+        self.moment[0] += record.moment[0];
+        self.moment[1] += record.moment[1];
+        self.checks.iter_mut().zip(record.checks).for_each(|(to, from)| *to += from);
+        true
+    }
+
+    /// Adds up what two rays of a beam brought.
+    pub fn join_beam(&mut self, record: &Record) -> bool {
+        let same = self.key == record.key && self.checks == record.checks;
+        self.weight += if same { record.weight } else { 0.0 };
+        same
     }
 
     /// The direction of an escape.
     #[inline(always)]
     pub fn direction(&self) -> Vec3 {
-        unpack((self.key & !ESCAPE) >> 16)
+        octahedron::unpack::<BITS>((self.key & !ESCAPE) >> 16)
     }
 }
 
-const STEPS: f64 = 8_388_606.0;
-
-/// A direction on the octahedron, 23 bits a coordinate: error below 4e-7 rad.
-fn pack(d: Vec3) -> u64 {
-    let sum = fabs(d.x) + fabs(d.y) + fabs(d.z);
-    let (mut x, mut y) = (d.x / sum, d.y / sum);
-    if d.z < 0.0 {
-        let fold = |a: f64, b: f64| (1.0 - fabs(b)) * if a < 0.0 { -1.0 } else { 1.0 };
-        (x, y) = (fold(x, y), fold(y, x));
-    }
-    let step = |a: f64| ((a + 1.0) * 0.5 * STEPS + 0.5) as u64;
-    step(x) << 23 | step(y)
-}
-
-fn unpack(p: u64) -> Vec3 {
-    let back = |s: u64| (s & 0x7f_ffff) as f64 / STEPS * 2.0 - 1.0;
-    let (mut x, mut y) = (back(p >> 23), back(p));
-    let z = 1.0 - fabs(x) - fabs(y);
-    if z < 0.0 {
-        let fold = |a: f64, b: f64| (1.0 - fabs(b)) * if a < 0.0 { -1.0 } else { 1.0 };
-        (x, y) = (fold(x, y), fold(y, x));
-    }
-    Vec3::new(x, y, z).normalize()
-}
+/// Bits of each coordinate of an escape's direction: error below 4e-7 rad.
+const BITS: u32 = 23;
 
 /// A block of finished rows.
 #[derive(Clone, Copy, Debug)]
@@ -349,25 +365,5 @@ fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
         words: block.words,
         products: block.products,
         bands: block.head.bands as usize,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn directions_survive_packing() {
-        for i in 0..1000 {
-            let (a, b) = (f64::from(i) * 0.37, f64::from(i) * 0.002 - 1.0);
-            let s = crate::math::sqrt(1.0 - b * b);
-            let d = Vec3::new(s * crate::math::cos(a), s * crate::math::sin(a), b);
-            // two steps of 2^-22 on the octahedron, stretched by at most sqrt 3 on the sphere
-            assert!((unpack(pack(d)) - d).length() < 5e-7, "{d}");
-            assert!(pack(d) < 1 << 46);
-        }
-        for d in [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z] {
-            assert!((unpack(pack(d)) - d).length() < 1e-6);
-        }
     }
 }

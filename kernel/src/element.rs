@@ -122,6 +122,19 @@ impl<'m> Elements<'m> {
         (self.facet.at(unknown / self.sides.max(1)) as usize, unknown % self.sides.max(1))
     }
 
+    /// Sides of all facets.
+    #[inline(always)]
+    pub fn facet_sides(&self) -> usize {
+        self.first.len().saturating_sub(1) * self.sides
+    }
+
+    /// The place of an unknown's side of a facet among them: facet * sides + side.
+    #[inline(always)]
+    pub fn facet_side(&self, unknown: usize) -> usize {
+        let (facet, side) = self.facet_of(unknown);
+        facet * self.sides + side
+    }
+
     /// The unknowns of one side of a facet.
     pub fn unknowns_of(&self, facet: usize, side: usize) -> impl Iterator<Item = usize> + Clone + use<> {
         let sides = self.sides;

@@ -30,6 +30,7 @@ use crate::simd::Isa;
 use crate::sky::{Sky, SkyInput};
 use crate::subdivide::Cut;
 use crate::sun::{Sun, SunInput};
+use crate::sun_image::{self, Noting, SunImages};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Instant;
@@ -99,9 +100,23 @@ pub struct Lit<'g> {
     reference: Vec<f64>,
     irradiance: Vec<f64>,
     sun: Vec<f64>,
+    suns: Suns,
     variance: Vec<f32>,
     brightest: f64,
     report: Report,
+}
+
+/// What mirrors throw of the sun.
+#[derive(Debug, Default)]
+struct Suns {
+    slots: Vec<u64>,
+    thrown: Vec<f64>,
+}
+
+impl Suns {
+    fn images(&self) -> SunImages<'_> {
+        SunImages { slots: &self.slots, thrown: &self.thrown }
+    }
 }
 
 /// A photometric image: rows from the top, (row, column, band).
@@ -248,14 +263,15 @@ impl Host {
             })?;
         }
         let mut lit_share = std::vec![0.0; unknowns];
+        let mut suns = Suns::default();
         if let Some(sun) = &light.sun {
             let rays = self.split(&mut lit_share, 1, |range, out| {
                 light::sun_rows(scene, &geometry.bvh, elements, &coupling, sun, range, out)
             })?;
             report.rays.sun += rays.iter().sum::<u64>();
-            report.rays.sun += self.beams(geometry, sun, shape, &mut direct)?;
+            report.rays.sun += self.beams(geometry, sun, shape, &mut direct, &mut suns)?;
         }
-        report.bytes.light = 8 * (direct.len() + lit_share.len());
+        report.bytes.light = 8 * (direct.len() + lit_share.len() + suns.slots.len() + suns.thrown.len());
         report.seconds.light = clock.lap();
         let (coupling, light) = (&coupling, &light);
         let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
@@ -273,13 +289,16 @@ impl Host {
         }
         policy::check_radiance(&radiance, bands)?;
         let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
+        let sides = elements.facet_sides();
+        suns.images().take_off(shape, sides, |unknown| elements.facet_side(unknown), &mut irradiance);
         system.extend(&mut irradiance);
         let variance = self.accuracy(&system, &radiance, &reference)?;
         let brightest = policy::brightest(scene, light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
         let light = *light;
-        Ok(Lit { geometry, light, shape, reference, irradiance, sun: lit_share, variance, brightest, report })
+        let sun = lit_share;
+        Ok(Lit { geometry, light, shape, reference, irradiance, sun, suns, variance, brightest, report })
     }
 
     /// Expected squared error of each unknown.
@@ -310,6 +329,7 @@ impl Host {
         sun: &Sun<'_>,
         shape: Shape,
         table: &mut [f64],
+        suns: &mut Suns,
     ) -> Result<u64, Error> {
         let scene = &geometry.scene;
         let Settings { tolerance, max_bounces, all_irradiances, .. } = geometry.settings;
@@ -322,7 +342,12 @@ impl Host {
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
         let beams = Coupling::new(&blocks, rows)?;
-        beam::add(&beams, &geometry.coupling()?, sun, shape, table);
+        *suns = Suns {
+            slots: std::vec![0; sun_image::places(rows)],
+            thrown: std::vec![0.0; geometry.elements.unknowns() * shape.levels * shape.bands],
+        };
+        let mut noting = Noting { slots: &mut suns.slots, thrown: &mut suns.thrown };
+        beam::add(&beams, (&geometry.coupling()?, &geometry.elements), sun, shape, table, &mut noting);
         Ok(beams.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
     }
 
@@ -524,6 +549,7 @@ impl Lit<'_> {
             elements: &self.geometry.elements,
             light: &self.light,
             irradiance: &self.irradiance,
+            images: self.suns.images(),
             shape: self.shape,
             variance: &self.variance,
             reference: &self.reference,

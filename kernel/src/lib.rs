@@ -80,6 +80,7 @@ pub mod light;
 pub mod lobe;
 pub mod math;
 pub mod mirror;
+mod octahedron;
 pub mod plane;
 pub mod policy;
 pub mod qmc;
@@ -94,6 +95,7 @@ pub mod sky;
 mod sort;
 pub mod subdivide;
 pub mod sun;
+pub mod sun_image;
 
 pub use error::{Error, Field};
 

@@ -16,6 +16,7 @@ use crate::radiosity::{bound, sweeps};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sky::LARGEST;
 use crate::sun::Sun;
+use crate::sun_image;
 
 /// Refuses a tolerance outside 1e-6 to 0.1.
 pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {
@@ -62,7 +63,7 @@ pub fn beams(
     }
     let rays = clamp(100.0 / tolerance, 32768.0, 1e8);
     let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
-    Some(BeamSettings::new(scene, sun, rays, 1e-3 * tolerance, mirrors))
+    Some(BeamSettings::new(scene, sun, rays, sun_image::CUTOFF * tolerance, mirrors))
 }
 
 /// How far specular chains are followed.
@@ -210,6 +211,9 @@ impl Limit {
 /// quarters tell, in nine of ten: a few elements may carry it.
 const CAUTION: f64 = 1.5;
 
+/// What pixels of f32 and directions of images of the sun are wrong by.
+const ROUNDING: f64 = 1e-7;
+
 /// Expected eps of eq. 16 of an image, relative to the reference radiance, and its largest part: `tally` of all its
 /// rows, `solver` the bound on the radiances' error.
 pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
@@ -220,7 +224,8 @@ pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
         (Limit::Solver, solver),
         (Limit::Chain, tally.tail),
     ];
-    let sum: f64 = parts.iter().map(|(_, e)| e * e).sum();
+    let sum: f64 = parts.iter().map(|(_, e)| e * e).sum::<f64>()
+        + if tally.object_pixels > 0 { ROUNDING * ROUNDING } else { 0.0 };
     let largest = parts.iter().fold((Limit::Nothing, 0.0), |a, &b| if b.1 > a.1 { b } else { a });
     (sqrt(sum), largest.0)
 }

@@ -60,6 +60,11 @@ impl<'a> Sun<'a> {
         self.irradiance.len()
     }
 
+    /// The same sun seen in another direction, a unit vector: its image in mirrors.
+    pub fn seen_toward(&self, direction: Vec3) -> Sun<'a> {
+        Sun { direction, ..*self }
+    }
+
     /// Unit vector toward the centre.
     pub fn direction(&self) -> Vec3 {
         self.direction

@@ -23,6 +23,7 @@ use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyInput};
 use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
+use blik_kernel::sun_image::{self, Noting, SunImages};
 use std::ops::Range;
 
 /// How a run is carried out; what it computes does not depend on it, but for the tolerance.
@@ -78,6 +79,16 @@ pub struct Tables {
     pub radiance: Vec<f64>,
     /// Mean and gradients of each unknown's irradiance, each band.
     pub irradiance: Vec<f64>,
+    /// Images of the sun, and what they throw; how much of both is in use.
+    slots: Vec<u64>,
+    thrown: Vec<f64>,
+    images: (usize, usize),
+}
+
+impl Tables {
+    fn images(&self) -> SunImages<'_> {
+        SunImages { slots: &self.slots[..self.images.0], thrown: &self.thrown[..self.images.1] }
+    }
 }
 
 /// What a view writes.
@@ -108,6 +119,9 @@ impl Workspace {
                 sun: vec![f64::NAN; unknowns],
                 radiance: vec![f64::NAN; bands * unknowns],
                 irradiance: vec![f64::NAN; 3 * bands * unknowns],
+                slots: vec![u64::MAX; sun_image::places(2 * facets)],
+                thrown: vec![f64::NAN; bands * unknowns],
+                images: (0, 0),
             },
             view: Outputs {
                 scratch: vec![0xa5; 1 << 20],
@@ -262,6 +276,7 @@ impl Stage<'_> {
         }
         let lit = &mut tables.sun[..counts.unknowns];
         lit.fill(0.0);
+        tables.images = (0, 0);
         let Some(sun) = &self.light.sun else { return Ok(()) };
         split(parts, counts.unknowns, 1, lit, |range, out| {
             counts.sun += light::sun_rows(scene, bvh, elements, self.coupling, sun, range, out)?;
@@ -274,7 +289,12 @@ impl Stage<'_> {
             beam::fill(scene, bvh, elements, sun, &settings, range, memory)
         })?;
         let thrown = Coupling::new(&blocks[..parts], mirrors)?;
-        beam::add(&thrown, self.coupling, sun, self.shape, direct);
+        tables.images = (sun_image::places(mirrors), counts.unknowns * self.shape.bands);
+        let (slots, means) = (&mut tables.slots[..tables.images.0], &mut tables.thrown[..tables.images.1]);
+        slots.fill(0);
+        means.fill(0.0);
+        let mut noting = Noting { slots, thrown: means };
+        beam::add(&thrown, (self.coupling, elements), sun, self.shape, direct, &mut noting);
         counts.beams =
             thrown.rows(0..mirrors).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum();
         Ok(())
@@ -284,7 +304,7 @@ impl Stage<'_> {
     fn solve(&self, tables: &mut Tables, counts: &mut Counts) -> Result<f64, Error> {
         let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
         let (rows, stride) = (unknowns * bands, self.shape.stride());
-        let Tables { direct, sun, radiance, next, irradiance, .. } = tables;
+        let Tables { direct, sun, radiance, next, irradiance, slots, thrown, images, .. } = tables;
         let (direct, irradiance) = (&mut direct[..unknowns * stride], &mut irradiance[..unknowns * stride]);
         self.sweeps(
             direct,
@@ -307,6 +327,9 @@ impl Stage<'_> {
             irradiance,
             counts,
         )?;
+        let images = SunImages { slots: &slots[..images.0], thrown: &thrown[..images.1] };
+        let side_of = |unknown| self.elements.facet_side(unknown);
+        images.take_off(self.shape, self.elements.facet_sides(), side_of, irradiance);
         self.system(direct, &sun[..unknowns]).extend(irradiance);
         Ok(policy::brightest(self.scene, self.light, self.reference, &radiance[..rows]))
     }
@@ -375,6 +398,7 @@ impl Stage<'_> {
             elements: self.elements,
             light: self.light,
             irradiance: &tables.irradiance[..counts.unknowns * self.shape.stride()],
+            images: tables.images(),
             shape: self.shape,
             variance: &tables.variance[..counts.unknowns],
             reference: self.reference,

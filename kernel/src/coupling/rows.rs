@@ -212,12 +212,12 @@ impl Tracer<'_, '_> {
         let material = self.scene.material(facet);
         let black = self.scene.diffuse(material).iter().all(|&d| d == 0.0);
         if self.scene.areas().at(facet) == 0.0 || (black && !self.settings.all) {
-            self.sink.end_row(Row::default(), Some);
+            self.sink.end_row(Row::default(), Some, Record::join);
             return Some(());
         }
         let normal = self.scene.side_normal(facet, side);
         if opens_to_sky(self.scene, self.bvh, facet, normal) {
-            self.sink.end_row(Row { state: OPEN, exposed: 1.0, ..Row::default() }, Some);
+            self.sink.end_row(Row { state: OPEN, exposed: 1.0, ..Row::default() }, Some, Record::join);
             return Some(());
         }
         let start = Start {
@@ -270,7 +270,7 @@ impl Tracer<'_, '_> {
             (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
         let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen);
-        self.sink.end_row(stats, |record| {
+        let finish = |record: Record| {
             let bin = record.gradient[0] as usize % BINS;
             if !open[bin] || (record.is_escape() && record.word() == dropped) {
                 return None;
@@ -286,7 +286,8 @@ impl Tracer<'_, '_> {
             let ([a, b], [c, d]) = (split(difference, part < 2), split(departure, first));
             let moment = record.moment.map(|m| mean as f32 * m);
             Some(Record { weight: mean * record.weight, gradient, checks: [a, b, c, d], moment, ..record })
-        });
+        };
+        self.sink.end_row(stats, finish, Record::join);
     }
 
     /// Ray number `tally.rays` of a row and its mirror chain.

@@ -99,8 +99,14 @@ impl<'m> Sink<'m> {
         self.used = self.start;
     }
 
-    /// Ends the present row with what `finish` leaves of each record: sorts and merges the records.
-    pub fn end_row(&mut self, stats: Row, finish: impl Fn(Record) -> Option<Record>) {
+    /// Ends the present row with what `finish` leaves of each record: sorts the records and adds up those that `join`
+    /// takes for the same.
+    pub fn end_row(
+        &mut self,
+        stats: Row,
+        finish: impl Fn(Record) -> Option<Record>,
+        join: impl Fn(&mut Record, &Record) -> bool,
+    ) {
         let row = self.records.part_mut(self.start..self.used);
         let mut kept = 0;
         for i in 0..row.len() {
@@ -112,7 +118,7 @@ impl<'m> Sink<'m> {
         let row = row.head_mut(kept);
         let words = &self.words;
         sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
-        let kept = merge(row);
+        let kept = merge(row, join);
         let escapes = self.start + row.head(kept).partition_point(|r| !r.is_escape());
         self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..stats });
         self.done += 1;
@@ -132,24 +138,14 @@ impl<'m> Sink<'m> {
     }
 }
 
-/// Adds up neighbours with the same key and returns how many records are left.
-fn merge(row: &mut [Record]) -> usize {
+/// Adds up neighbours that are the same and returns how many records are left.
+fn merge(row: &mut [Record], join: impl Fn(&mut Record, &Record) -> bool) -> usize {
     let mut kept: usize = 0;
     for i in 0..row.len() {
         let record = row.at(i);
-        match row.get_mut(kept.wrapping_sub(1)) {
-            Some(last) if last.key == record.key => {
-                last.weight += record.weight;
-                last.gradient[0] += record.gradient[0];
-                last.gradient[1] += record.gradient[1];
-                last.moment[0] += record.moment[0];
-                last.moment[1] += record.moment[1];
-                last.checks.iter_mut().zip(record.checks).for_each(|(to, from)| *to += from);
-            }
-            _ => {
-                row.set(kept, record);
-                kept += 1;
-            }
+        if !row.get_mut(kept.wrapping_sub(1)).is_some_and(|last| join(last, &record)) {
+            row.set(kept, record);
+            kept += 1;
         }
     }
     kept

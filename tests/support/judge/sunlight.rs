@@ -108,8 +108,14 @@ impl Judge<'_> {
     ) {
         if toward.dot(normal) > 0.0 {
             path.rays += 1;
+            let place = (point, normal, facet);
             if !self.bvh.occluded(&leave(point, normal, facet, toward)) {
                 each(path, toward, &UNIT);
+            } else if matches!(self.mirrors, Mirrors::Maps(_))
+                // two mirrors face to face show the sun where it stands
+                && let Some(share) = self.by_mirrors(path, place, toward, toward)
+            {
+                each(path, toward, &share);
             }
         }
         match &self.mirrors {
