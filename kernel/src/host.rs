@@ -5,8 +5,10 @@
 //! [`Host::signature`] for each view. A new light traces no visibility rays, a new view solves nothing.
 
 mod report;
+mod rounds;
 
 pub use report::*;
+pub use rounds::Rounds;
 
 use crate::accuracy;
 use crate::arena::Memory;

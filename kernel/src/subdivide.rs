@@ -155,7 +155,7 @@ impl<'m> Cut<'m> {
         }
         let values = self.unevenness.part(range.clone());
         let elements = self.facets + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
-        let cuts = (self.most.saturating_sub(elements) / (QUARTERS - 1))
+        let cuts = (self.most.saturating_sub(elements) * 3 / (4 * (QUARTERS - 1)))
             .min(self.nodes.len().saturating_sub(self.used) / QUARTERS);
         let threshold = threshold(values, self.goal - self.settled, cuts);
         for at in range.clone() {
