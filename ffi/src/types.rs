@@ -245,7 +245,10 @@ pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
 }
 
 /// Sets a struct's defaults; nothing where the pointer is null.
-unsafe fn set<T>(at: *mut T, value: T) {
+///
+/// # Safety
+/// `at` is null or points to memory for a T.
+pub(crate) unsafe fn set<T>(at: *mut T, value: T) {
     if !at.is_null() && at.is_aligned() {
         // SAFETY: by the caller's promise there is room for a T.
         unsafe { at.write(value) };

@@ -333,7 +333,7 @@ pub unsafe extern "C" fn blik_image_rows(
     })
 }
 
-fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usize>, blik_error> {
+pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usize>, blik_error> {
     match first.checked_add(rows) {
         Some(end) if end <= all => Ok(first..end),
         _ => Err(blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_ROWS).at(0, 0, first as f64)),

@@ -177,6 +177,42 @@ int main() {
         caught += error.status() == BLIK_ERROR_VERTEX_INDEX && error.info().value == 6.0;
     }
     REQUIRE(caught == 2);
+
+    // the plane model: between two walls, and errors
+    blik::plane::bodies bodies;
+    bodies.circle(-1.25, 0, 1, 0, 12).circle(1.25, 0, 1, 0, 12).material(0.3, 0.1);
+    bodies.polygon({{-1, -3}, {1, -3}, {1, -2}, {-1, -2}}, 1, 2).material(0.5, 0.2, 8.0);
+    const blik::plane::scene flat(bodies, blik::plane::settings(1e-3));
+    const blik::plane::coupling rows(flat, blik::threads(2));
+    blik::plane::solution even(rows, blik::plane::light(blik::plane::sky()));
+    const std::vector<blik_plane_sample> line = even.image(0.3, 200);
+    REQUIRE(flat.info().primitives == 6 && rows.info().unknowns == even.unknowns(flat).size());
+    REQUIRE(std::all_of(line.begin(), line.end(), [](const blik_plane_sample &s) {
+        return s.object == 0 ? s.radiance == 1.0 : s.radiance > 0.05 && s.radiance < 1.0;
+    }));
+    const blik::plane::light both(blik::plane::sky(), blik::plane::sun({1, 2}));
+    const blik::plane::solution lit(rows, both, blik::threads(3));
+    const std::vector<blik_plane_sample> bright = lit.image(0.3, 200), again = lit.image(0.3, 200, blik::threads(3));
+    for (std::size_t i = 0; i < 200; ++i) {
+        REQUIRE(bright[i].radiance >= line[i].radiance && bright[i].radiance == again[i].radiance);
+    }
+    const std::vector<blik_plane_ray> down = {{{-1.25, 5}, {0, -1}}};
+    REQUIRE(flat.first_hits(down)[0].primitive == 0 && lit.radiance(down)[0].object == 1);
+    REQUIRE(flat.visible({0, 5}, {0, 1}).size() == 1 && flat.visible({0, 5}, {0, -1}).size() >= 5);
+    even = blik::plane::solution(rows, both);
+    REQUIRE(even.info().contraction < 1.0 && even.info().sweeps > 1);
+    caught = 0;
+    try {
+        const blik::plane::scene none{blik::plane::bodies()};
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_NO_FACETS;
+    }
+    try {
+        const blik::plane::scene none(blik::plane::bodies().circle(0, 0, -1, 0, 1).material(0.5));
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_BODY && error.info().field == BLIK_FIELD_BODY_RADIUS;
+    }
+    REQUIRE(caught == 2);
     std::puts("ok");
     return 0;
 }
