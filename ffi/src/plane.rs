@@ -24,6 +24,9 @@ use core::ops::Range;
 /// Rows or samples of one piece of work.
 const PIECE: usize = 8;
 
+/// What is done with a range of rows.
+type Rows<'a> = dyn Fn(Range<usize>, &mut Scratch<'_>) -> Result<(), blik_error> + Sync + 'a;
+
 /// Scratch memory of a stage, a part for each lane.
 struct Lanes {
     start: Start<u8>,
@@ -54,7 +57,7 @@ impl Lanes {
         share: f64,
         (scene, cuts): (&PlaneScene<'_>, usize),
         runner: &mut Runner,
-        work: &(dyn Fn(Range<usize>, &mut Scratch<'_>) -> Result<(), blik_error> + Sync),
+        work: &Rows<'_>,
     ) -> Result<(), blik_error> {
         runner.each(rows.div_ceil(PIECE), self.count, share, &|lane, item| {
             // SAFETY: a lane's part is used by that lane alone, one item after the other; there are `count` parts.
