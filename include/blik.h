@@ -1836,7 +1836,8 @@ void blik_intersector_init(struct blik_intersector *intersector);
  *
  * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
  * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
- * Rays may come in any number at once (at present: one).
+ * Rays come up to 32 at once where none depends on what another meets (the first rays of form factors, of elements and of
+ * pixels, and those toward the sun's disc), else one by one (chains by way of mirrors).
  */
 int32_t blik_scene_set_intersector(const struct blik_scene *scene,
                                    const struct blik_intersector *intersector,

@@ -10,7 +10,7 @@ use crate::light::{Light, Shape};
 use crate::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::mirror::{Mirror, Surface};
 use crate::qmc::{Sequence, hash2};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sun_image::SunImages;
 
@@ -259,23 +259,28 @@ impl Fan {
 impl Solved<'_> {
     /// Radiance against `ray`, added to `terms` (cleared by the caller).
     pub fn radiance(&self, ray: &Ray, sample: Sample, terms: &mut Terms) -> Path {
+        self.radiance_at(ray, self.bvh.closest(ray), sample, terms)
+    }
+
+    /// The same of a ray that is known to meet `hit` first.
+    pub fn radiance_at(&self, ray: &Ray, hit: Option<Hit>, sample: Sample, terms: &mut Terms) -> Path {
         let mut path = Path::default();
         let bands = self.shape.bands;
         let mut leg = Leg { ray: *ray, through: [0.0; MAX_BANDS], mirrors: 0, lobes: 0, lobe: false };
         leg.through.head_mut(bands).fill(1.0);
-        self.follow(leg, sample, terms, &mut path);
+        self.follow(leg, hit, sample, terms, &mut path);
         path
     }
 
-    /// Follows a chain to its end; the first lobe branches where the ray stands for itself, all others take one ray.
-    fn follow(&self, mut leg: Leg, sample: Sample, terms: &mut Terms, path: &mut Path) {
+    /// Follows a chain whose ray meets `hit` first to its end; the first lobe branches where the ray stands for itself, all others take one ray.
+    fn follow(&self, mut leg: Leg, mut hit: Option<Hit>, sample: Sample, terms: &mut Terms, path: &mut Path) {
         loop {
-            let Some(hit) = self.bvh.closest(&leg.ray) else {
+            let Some(met) = hit else {
                 self.escape(&leg, terms);
                 return;
             };
             path.object |= leg.mirrors == 0;
-            let Some(surface) = Surface::of_hit(self.scene, &hit) else { return };
+            let Some(surface) = Surface::of_hit(self.scene, &met) else { return };
             self.add_diffuse(&leg, &surface, sample, terms, path);
             let Some(mirror) = surface.mirror(self.scene) else { return };
             if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
@@ -315,6 +320,7 @@ impl Solved<'_> {
                 }
             }
             path.rays += 1;
+            hit = self.bvh.closest(&leg.ray);
         }
     }
 
@@ -383,7 +389,8 @@ impl Solved<'_> {
         before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = fan.terms.sum(b));
         fan.path.rays += 1;
         let of = Sample::OneOf { seed: sample.seed(), index: fan.count };
-        self.follow(leg, of, &mut fan.terms, &mut fan.path);
+        let hit = self.bvh.closest(&leg.ray);
+        self.follow(leg, hit, of, &mut fan.terms, &mut fan.path);
         for (b, (square, before)) in fan.squares.iter_mut().zip(before).enumerate().take(bands) {
             let value = fan.terms.sum(b) - before;
             *square += value * value;

@@ -3,6 +3,7 @@
 mod lines;
 
 use crate::arena::{Arena, Need};
+use crate::bvh::Ahead;
 use crate::camera::{Camera, Sampling};
 use crate::chain::{Sample, Solved, Terms};
 use crate::error::{Error, Field};
@@ -261,15 +262,22 @@ impl<'a> Painter<'a, '_> {
     /// Computes the centres of a row.
     fn line(&mut self, row: isize, columns: Range<isize>) {
         let bands = self.solved.shape.bands;
-        for j in columns {
+        let mut ahead = Ahead::default();
+        let (start, count) = (columns.start, columns.end.saturating_sub(columns.start) as u32);
+        for (n, j) in columns.enumerate() {
             let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
+            let (camera, n) = (&self.camera, n as u32);
+            let any = |m: u32| {
+                if m == n { ray } else { camera.ray((start + m as isize) as f64 + 0.5, row as f64 + 0.5) }
+            };
+            let hit = self.solved.bvh.closest_of(&mut ahead, n, count, any);
             self.terms.clear(bands);
             let seed = hash2(row as u32, j as u32);
             let sample = match self.camera.sampling() {
                 Sampling::Centre => Sample::Alone(seed),
                 Sampling::Area => Sample::Glance(seed),
             };
-            let path = self.solved.radiance(&ray, sample, &mut self.terms);
+            let path = self.solved.radiance_at(&ray, hit, sample, &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let at = self.slot(row, j);
@@ -427,12 +435,17 @@ impl<'a> Painter<'a, '_> {
         let mut sums = Terms::ZERO;
         let mut squares = [0.0; MAX_BANDS];
         let (mut n, mut goal) = (0u32, FEWEST);
-        let mut error = 0.0;
+        let (mut error, mut ahead) = (0.0, Ahead::default());
         while n < goal {
-            let (x, y) = sequence.pair(n, 0);
-            let ray = self.camera.ray(column as f64 + x, row as f64 + y);
+            let camera = &self.camera;
+            let any = |n: u32| {
+                let (x, y) = sequence.pair(n, 0);
+                camera.ray(column as f64 + x, row as f64 + y)
+            };
+            let ray = any(n);
+            let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
             self.terms.clear(bands);
-            let path = self.solved.radiance(&ray, Sample::OneOf { seed, index: n }, &mut self.terms);
+            let path = self.solved.radiance_at(&ray, hit, Sample::OneOf { seed, index: n }, &mut self.terms);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             sums.add(&self.terms, bands);

@@ -88,11 +88,13 @@ int main() {
     struct tracer {
         blik::scene scene;
         bool right;
-        std::atomic<std::size_t> calls{0};
+        std::atomic<std::size_t> rays{0}, calls{0}, shadows{0}, shadow_calls{0}, most{0};
     };
     const auto first_facets = [](void *user, const blik_ray *sent, std::size_t count, uint32_t *found) {
         tracer &self = *static_cast<tracer *>(user);
-        self.calls += count;
+        self.rays += count;
+        self.most = std::max<std::size_t>(self.most, count);
+        self.calls += 1;
         for (std::size_t i = 0; i < count; ++i) {
             blik_hit hit;
             hit.facet = 3;
@@ -103,12 +105,14 @@ int main() {
         }
     };
     const auto any_facets = [](void *user, const blik_ray *sent, std::size_t count, uint8_t *found) {
+        static_cast<tracer *>(user)->shadows += count;
+        static_cast<tracer *>(user)->shadow_calls += 1;
         if (blik_any_hits(static_cast<tracer *>(user)->scene.get(), sent, count, nullptr, nullptr, found) != BLIK_OK) {
             std::abort();
         }
     };
     for (const bool right : {true, false}) {
-        tracer other{blik::scene(mesh), right};
+        tracer other{blik::scene(mesh), right, {}, {}, {}, {}, {}};
         blik_intersector intersector;
         blik_intersector_init(&intersector);
         intersector.first_facets = first_facets;
@@ -117,7 +121,14 @@ int main() {
         blik::scene traced(mesh);
         traced.set_intersector(intersector);
         const blik::coupling own(traced, blik::settings(2e-2), blik::threads(2));
-        REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.calls > 1000);
+        REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.rays > 1000);
+        // in batches where the library may
+        REQUIRE(other.most == 32 && other.rays > other.calls && other.shadows > other.shadow_calls);
+        std::vector<blik_ray> many(100, rays[0]);
+        std::vector<blik_hit> found(100);
+        const std::size_t before = other.calls;
+        traced.closest_hits(many, found);
+        REQUIRE(found[99].t == 2.0 && other.calls - before <= 10);
     }
     REQUIRE(blik_scene_set_intersector(scene.get(), nullptr, nullptr) == BLIK_OK);
 
