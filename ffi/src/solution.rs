@@ -230,7 +230,7 @@ impl Sizes {
         let (mut beams, mut images) = (0, (0, 0));
         let unknowns = coupling.elements.unknowns();
         if let Some(settings) = light.sun.as_ref().and_then(|sun| beam_settings(coupling, sun)) {
-            beams = sink::bytes(16, 64, 2 * beam::most_rays(scene, &settings), scene.bands())?;
+            beams = sink::bytes(16, 64, beam::unmerged(scene, &coupling.elements, &settings), scene.bands())?;
             let sides = coupling.elements.facet_sides();
             images = (sun_image::places(sides), unknowns * shape.levels * shape.bands);
         }
@@ -484,7 +484,7 @@ impl Shine<'_> {
         let (base, elements) = (self.coupling.base, &self.coupling.elements);
         let (scene, rows) = (&base.scene, base.scene.facets() * base.scene.sides());
         let piece = rows.div_ceil(256).clamp(16, 1024);
-        let usual = sink::bytes(piece, 64, 2 * beam::most_rays(scene, settings), scene.bands())?;
+        let usual = sink::bytes(piece, 64, beam::unmerged(scene, elements, settings), scene.bands())?;
         let mut lanes = runner.lanes().min(scratch.len() / usual.max(1)).max(1);
         let (mut next, mut traced) = (0, 0);
         let size = scratch.len();
@@ -638,7 +638,8 @@ impl Solve<'_> {
 }
 
 /// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with
-/// mirrors and a sun on several threads.
+/// mirrors and a sun on several threads. Where mirrors scatter sunlight over many more elements than usual, the call
+/// returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
