@@ -473,6 +473,7 @@ impl Shine<'_> {
 
     /// Adds the sunlight that mirrors throw: each lane traces its rows in its part of the scratch memory, and the
     /// results are added in the order of the rows.
+    #[inline(never)]
     fn beams(
         &self,
         sun: &Sun<'_>,
@@ -493,7 +494,7 @@ impl Shine<'_> {
             let part = (size / lanes.max(1)) & !(ALIGNMENT - 1);
             let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
             let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
-            let mut done = [0; MOST_LANES];
+            let mut done = [0u16; MOST_LANES];
             let noted = Start(done.as_mut_ptr());
             let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (rows + lanes * piece) as f64;
             runner.each(lanes, lanes, share, &|_, lane| {
@@ -506,7 +507,7 @@ impl Shine<'_> {
                     (memory, &mut *noted.at(lane))
                 };
                 match beam::fill(scene, &base.bvh, elements, sun, settings, range(lane), memory) {
-                    Ok(rows) => *noted = rows,
+                    Ok(rows) => *noted = rows as u16, // a piece has at most 1024
                     Err(Error::BufferTooSmall { .. }) => {}
                     Err(error) => return Err(error.into()),
                 }
@@ -514,6 +515,7 @@ impl Shine<'_> {
             })?;
             let before = next;
             for (lane, done) in done.into_iter().enumerate().take(lanes).filter(|(_, done)| *done > 0) {
+                let done = usize::from(done);
                 let wanted: Range<usize> =
                     (before + lane * piece).min(rows)..(before + (lane + 1) * piece).min(rows);
                 if wanted.start != next {

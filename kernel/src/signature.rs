@@ -2,7 +2,7 @@
 
 use crate::bvh::Ahead;
 use crate::camera::Camera;
-use crate::chain::{Sample, Solved, Terms};
+use crate::chain::{Sample, Solved, Terms, Work};
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::{Vec3, frame, unit};
@@ -88,7 +88,7 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
     let bands = solved.shape.bands;
     let scale = solved.scene.scale();
     let area = view.cell_area / (scale * scale);
-    let mut terms = Terms::ZERO;
+    let (mut terms, mut work) = (Terms::ZERO, Work::ZERO);
     for (row, sums) in range.zip(out) {
         *sums = Sums::ZERO;
         let sequence = Sequence::new(hash2(row as u32, 0x5160_0000));
@@ -104,8 +104,12 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
             let any = |n| if n == column { ray } else { cell(n) };
             let hit = solved.bvh.closest_of(&mut ahead, column, cells, any);
             terms.clear(bands);
-            let path =
-                solved.radiance_at(&ray, hit, Sample::OneOf { seed: row as u32, index: column }, &mut terms);
+            let path = solved.radiance_at(
+                (&ray, hit),
+                Sample::OneOf { seed: row as u32, index: column },
+                &mut terms,
+                &mut work,
+            );
             sums.rays += 1 + u64::from(path.rays);
             if path.object {
                 sums.area += area;
