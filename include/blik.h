@@ -491,6 +491,11 @@
 #define BLIK_FIELD_BODY_POINTS 31
 
 /**
+ * What a tally says of errors.
+ */
+#define BLIK_FIELD_TALLY 32
+
+/**
  * Numbers of blik_array: 32-bit floating point.
  */
 #define BLIK_F32 1
@@ -660,6 +665,17 @@ typedef struct blik_settings {
      * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
      */
     int32_t directional;
+    /**
+     * Not 0: where the caller's memory is too small for the rows, their rays are halved until it is not; what that costs
+     * is in the report's error estimate. Default 0: the call is refused and tells the bytes that it would need.
+     */
+    int32_t fit_memory;
+    /**
+     * Most rays that rows may send, those by way of mirrors not counted, but for 64 a row at least; 0 (default): as many
+     * as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
+     * goes on at a steady number of rays a second.
+     */
+    uint64_t ray_budget;
 } blik_settings;
 
 /**
@@ -1837,7 +1853,7 @@ void blik_intersector_init(struct blik_intersector *intersector);
  * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
  * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
  * Rays come up to 32 at once where none depends on what another meets (the first rays of form factors, of elements and of
- * pixels, and those toward the sun's disc), else one by one (chains by way of mirrors).
+ * pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
  */
 int32_t blik_scene_set_intersector(const struct blik_scene *scene,
                                    const struct blik_intersector *intersector,
@@ -2181,7 +2197,8 @@ int32_t blik_any_hits(const struct blik_scene *scene,
 
 /**
  * Bytes of memory that blik_solution_init needs for this light, at any address. More speeds up scenes with
- * mirrors and a sun on several threads.
+ * mirrors and a sun on several threads. Where mirrors scatter sunlight over many more elements than usual, the call
+ * returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
  */
 int32_t blik_solution_size(const struct blik_coupling *coupling,
                            const struct blik_light *light,

@@ -226,6 +226,9 @@ pub const BLIK_FIELD_BODY_RADIUS: i32 = 30;
 /// Coordinates of a body of the plane model: not finite, beyond 1e100, too few points, or two that coincide.
 pub const BLIK_FIELD_BODY_POINTS: i32 = 31;
 
+/// What a tally says of errors.
+pub const BLIK_FIELD_TALLY: i32 = 32;
+
 fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
@@ -260,6 +263,7 @@ fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_BODY_ELEMENTS => c"body elements",
         BLIK_FIELD_BODY_RADIUS => c"body radius",
         BLIK_FIELD_BODY_POINTS => c"body points",
+        BLIK_FIELD_TALLY => c"tally",
         _ => c"",
     }
 }

@@ -36,10 +36,12 @@ pub struct Tally {
 impl Tally {
     /// Adds the tally of the next range.
     pub fn add(&mut self, next: &Tally) {
-        self.object_pixels += next.object_pixels;
-        self.primary += next.primary;
-        self.chain += next.chain;
-        self.refined += next.refined;
+        // a caller may hand over any numbers
+        let add = |to: &mut u64, more: u64| *to = to.saturating_add(more);
+        add(&mut self.object_pixels, next.object_pixels);
+        add(&mut self.primary, next.primary);
+        add(&mut self.chain, next.chain);
+        add(&mut self.refined, next.refined);
         self.noise2 += next.noise2;
         self.sampling2 += next.sampling2;
         self.tail = self.tail.max(next.tail);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -145,6 +146,39 @@ int main() {
         thread.join();
     }
     REQUIRE(same == std::vector<int>(4, 1));
+
+    // budgets: fewer rays, in less memory, and a report that says what it costs
+    blik_settings fine = blik::settings(2e-3);
+    const blik::coupling full(scene, fine);
+    fine.ray_budget = full.info().rays / 8;
+    const blik::coupling few(scene, fine);
+    REQUIRE(few.info().rays < full.info().rays / 2 && few.info().pairs > 0);
+    const blik::solution dim(few, sun), bright_one(full, sun);
+    const blik_report rough = dim.report(dim.image(camera).tally), exact = bright_one.report(bright_one.image(camera).tally);
+    REQUIRE(rough.error_estimate > exact.error_estimate && rough.visibility_rays == few.info().rays);
+    fine.ray_budget = 0;
+    fine.fit_memory = 1;
+    std::size_t room = 0;
+    blik_error told_why{};
+    REQUIRE(blik_coupling_size(scene.get(), &fine, &told_why, &room) == BLIK_OK);
+    room += full.info().bytes / 4;
+    std::vector<unsigned char> little(room);
+    const blik_coupling *squeezed = nullptr;
+    REQUIRE(blik_coupling_init(scene.get(), &fine, nullptr, little.data(), room, &told_why, &squeezed) == BLIK_OK);
+    blik_coupling_info squeezed_info{};
+    REQUIRE(blik_coupling_get_info(squeezed, nullptr, &squeezed_info) == BLIK_OK);
+    REQUIRE(squeezed_info.bytes <= room && squeezed_info.rays < full.info().rays && squeezed_info.pairs > 0);
+    fine.fit_memory = 0;
+    REQUIRE(blik_coupling_init(scene.get(), &fine, nullptr, little.data(), room, &told_why, &squeezed) ==
+            BLIK_ERROR_BUFFER_TOO_SMALL);
+    REQUIRE(told_why.needed > room && told_why.given == room);
+    blik_tally odd = alone.tally;
+    odd.noise_squared = std::numeric_limits<double>::quiet_NaN();
+    blik_report none_of_it{};
+    REQUIRE(blik_get_report(solution.get(), &odd, &told_why, &none_of_it) == BLIK_ERROR_RANGE);
+    REQUIRE(told_why.field == BLIK_FIELD_TALLY && none_of_it.tolerance == 0.0);
+    odd.chain_rays = UINT64_MAX;
+    blik_tally_add(&odd, &odd);
 
     // an exception of a callback stops the stage and comes out where the caller asks for it
     int caught = 0;

@@ -100,6 +100,20 @@ impl RowSettings {
         whole(MOST_FACTOR * f64::from(self.rays))
     }
 
+    /// The same with half the rays; `None` where a row has the fewest.
+    pub fn fewer(self) -> Option<Self> {
+        (self.rays > FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
+    }
+
+    /// The same with as many rays as make no more than `budget` first rays of so many rows, or the fewest.
+    pub fn within(mut self, rows: usize, budget: u64) -> Self {
+        while u64::from(self.most_rays()).saturating_mul(rows as u64) > budget {
+            let Some(fewer) = self.fewer() else { break };
+            self = fewer;
+        }
+        self
+    }
+
     /// Settings for a tolerance: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
     /// kept at the tolerance.
     pub fn new(
