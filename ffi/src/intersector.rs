@@ -115,12 +115,20 @@ impl Caller {
     fn batches(&self, rays: &[Ray], answers: &mut [u32], ask: impl Fn(&[blik_ray], &mut [u32])) {
         let none =
             blik_ray { origin: [0.0; 3], direction: [0.0; 3], t_max: 0.0, skip: crate::scene::BLIK_NO_FACET };
-        for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
+        let (mut rays, mut answers) = (rays, answers);
+        while !rays.is_empty() {
+            let count = rays.len().min(BATCH);
+            let (Some((now, later)), Some((out, rest))) =
+                (rays.split_at_checked(count), answers.split_at_mut_checked(count))
+            else {
+                return;
+            };
             let mut outside = [none; BATCH];
-            for (to, ray) in outside.iter_mut().zip(rays) {
+            for (to, ray) in outside.iter_mut().zip(now) {
                 *to = self.outside(ray);
             }
-            ask(outside.get(..rays.len()).unwrap_or_default(), answers);
+            ask(outside.get(..count).unwrap_or_default(), out);
+            (rays, answers) = (later, rest);
         }
     }
 }

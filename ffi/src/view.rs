@@ -364,7 +364,8 @@ pub unsafe extern "C" fn blik_radiance(
         runner.rows(out, bands, 1.0, |range, out| {
             let mut terms = Terms::ZERO;
             let own = (range.start..).zip(rays.iter().skip(range.start));
-            for (out, (index, ray)) in out.chunks_exact_mut(bands.max(1)).zip(own) {
+            for (n, (index, ray)) in own.enumerate() {
+                let Some(out) = out.get_mut(n * bands..(n + 1) * bands) else { break };
                 terms.clear(bands);
                 let ray = Ray {
                     origin: scene.to_scene(Vec3::from_array(ray.origin)),

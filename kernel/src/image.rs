@@ -424,15 +424,23 @@ impl<'a> Painter<'a, '_> {
         let places = [0.0, 0.25, 0.5, 0.75, 1.0];
         let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
-        self.put(target, index, 1.0, |this, i| this.work.at(2 * lines::memory(stride) + i));
+        self.put(target, index, 1.0, |this, term, band| {
+            this.work.at(2 * lines::memory(stride) + term * measure.bands + band)
+        });
         Some(LINES * sqrt(error2))
     }
 
-    /// Writes a pixel's terms, numbered by band within each term, times `share`.
-    fn put(&self, target: &mut Target<'_>, index: usize, share: f64, of: impl Fn(&Self, usize) -> f64) {
+    /// Writes a pixel's terms, `of` term and band, times `share`.
+    fn put(
+        &self,
+        target: &mut Target<'_>,
+        index: usize,
+        share: f64,
+        of: impl Fn(&Self, usize, usize) -> f64,
+    ) {
         let bands = self.solved.shape.bands;
         for band in 0..bands {
-            let terms = [0, 1, 2].map(|term| of(self, term * bands + band));
+            let terms = [0, 1, 2].map(|term| of(self, term, band));
             target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
             for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
                 component.set(index * bands + band, (term * share) as f32);
@@ -493,12 +501,10 @@ impl<'a> Painter<'a, '_> {
                 }
             }
         }
-        let bands = self.solved.shape.bands;
-        self.put(target, index, 1.0 / f64::from(n), |this, i| {
+        self.put(target, index, 1.0 / f64::from(n), |this, term, band| {
             let sums = &this.board.sums;
-            [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse]
-                .get(i / bands)
-                .map_or(0.0, |t| t.at(i % bands))
+            let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
+            all.get(term).map_or(0.0, |values| values.at(band))
         });
         error
     }

@@ -364,9 +364,9 @@ fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64,
     let mut means = [0.0; 4];
     let row = |point: usize| {
         let (x, y) = middle(point);
-        [x, y, half[point] / rays, (all[point] - half[point]) / rays]
+        [x, y, half.at(point) / rays, (all.at(point) - half.at(point)) / rays]
     };
-    let points = || (0..POINTS).filter(|p| seen[*p]);
+    let points = || (0..POINTS).filter(|p| seen.at(*p));
     points().for_each(|p| means.iter_mut().zip(row(p)).for_each(|(m, v)| *m += v / count));
     let mut products = [[0.0; 4]; 4];
     for p in points() {

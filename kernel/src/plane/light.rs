@@ -1,7 +1,7 @@
 //! Sky and sun on every unknown, straight and by way of mirrors and lobes: the right-hand side of eq. (12).
 
 use crate::error::{Error, Field};
-use crate::index::{Index, IndexMut, pieces, span};
+use crate::index::{Index, IndexMut, parts, pieces, span};
 use crate::math::{cos, fabs, sin};
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::rows::{Gather, RowSettings, check_bounces, class, gather};
@@ -253,7 +253,7 @@ pub fn fill(
     scratch.check(scene, light.cuts().len())?;
     let closed = light.is_uniform();
     let traced = !closed || light.sun.is_some();
-    for (unknown, (open, out)) in range.zip(open.chunks_exact(classes.max(1)).zip(pieces(out, classes))) {
+    for (unknown, (open, out)) in range.zip(parts(open, classes).zip(pieces(out, classes))) {
         let sky = if let (Sky::Uniform(radiance), true) = (light.sky, closed) { radiance } else { 0.0 };
         out.iter_mut().zip(open).for_each(|(out, share)| *out = sky * share);
         if traced {

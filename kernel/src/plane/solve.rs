@@ -166,9 +166,9 @@ impl<'a> System<'a> {
 /// Scalar product in four lanes.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (a, b) in a4.zip(b4) {
+    let ((a4, a), (b4, b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let rest: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+    for (a, b) in a4.iter().zip(b4) {
         for (lane, (x, y)) in lanes.iter_mut().zip(a.iter().zip(b)) {
             *lane += x * y;
         }

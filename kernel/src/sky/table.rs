@@ -2,7 +2,7 @@
 
 use super::{LARGEST, SkyTable};
 use crate::error::{Error, Field};
-use crate::index::Index;
+use crate::index::{Index, parts};
 use crate::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, clamp, cos, fabs, floor, sin, sqrt, unit};
 use crate::quadrature::rule;
 
@@ -65,7 +65,7 @@ impl<'a> Table<'a> {
             1 => factors.iter().fold(0.0, |largest: f64, factor| largest.max(*factor)),
             _ => factors.get(band).copied().unwrap_or(0.0),
         };
-        for sample in input.radiance.chunks_exact(input.bands.max(1)) {
+        for sample in parts(input.radiance, input.bands) {
             for (band, &value) in sample.iter().enumerate() {
                 let value = f64::from(value);
                 if !(value >= 0.0 && value.is_finite()) {
@@ -123,7 +123,7 @@ impl<'a> Table<'a> {
     /// Largest sample per band.
     pub(super) fn largest(&self, out: &mut [f64]) {
         self.each_band(out, |sums| {
-            for sample in self.samples.chunks_exact(self.bands.max(1)) {
+            for sample in parts(self.samples, self.bands) {
                 for (largest, &value) in sums.iter_mut().zip(sample) {
                     *largest = largest.max(f64::from(value));
                 }
