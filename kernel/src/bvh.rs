@@ -23,7 +23,7 @@ use crate::simd::Isa;
 use build::{Binary, Facets};
 use external::External;
 
-pub use external::Intersector;
+pub use external::{Ahead, BATCH, Intersector, NO_FACET};
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.
@@ -208,7 +208,7 @@ impl<'m> Bvh<'m> {
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
         match &self.external {
-            Some(external) => external.tracer.any(ray),
+            Some(external) => external.any(ray),
             None => traverse::occluded(self, ray),
         }
     }

@@ -13,7 +13,7 @@
 use super::sink::Sink;
 use super::word::EMPTY;
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
-use crate::bvh::Bvh;
+use crate::bvh::{Ahead, Bvh};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -22,6 +22,7 @@ use crate::math::{Vec3, clamp, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::quarter::{self, QUARTERS};
+use crate::ray::Ray;
 use crate::scene::Scene;
 use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
@@ -101,6 +102,20 @@ impl RowSettings {
         whole(MOST_FACTOR * f64::from(self.rays))
     }
 
+    /// The same with half the rays; `None` where a row has the fewest.
+    pub fn fewer(self) -> Option<Self> {
+        (self.rays > FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
+    }
+
+    /// The same with as many rays as make no more than `budget` first rays of so many rows, or the fewest.
+    pub fn within(mut self, rows: usize, budget: u64) -> Self {
+        while u64::from(self.most_rays()).saturating_mul(rows as u64) > budget {
+            let Some(fewer) = self.fewer() else { break };
+            self = fewer;
+        }
+        self
+    }
+
     /// Settings for a tolerance: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
     /// kept at the tolerance.
     pub fn new(
@@ -138,7 +153,7 @@ pub fn fill(
     let sink = Sink::new(&range, scene.bands(), settings.directional, memory)?;
     let wanted = range.len();
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
-    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink };
+    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink, ahead: Ahead::default() };
     for unknown in range {
         if tracer.row(unknown).is_none() {
             tracer.sink.drop_row();
@@ -158,6 +173,8 @@ struct Tracer<'a, 'm> {
     settings: &'a RowSettings,
     mean_area: f64,
     sink: Sink<'m>,
+    /// What a caller's tracer said of a row's first rays.
+    ahead: Ahead,
 }
 
 /// Where the rays of a row start.
@@ -238,7 +255,7 @@ impl Tracer<'_, '_> {
             frame: frame(normal),
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
-        let most = self.most_rays(self.scene.areas()[facet] * self.elements.share(unknown));
+        let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
         let mut tally = self.rays(&start, most, [false; BINS])?;
         if self.scene.sides() == 1 && tally.mixed() != [false; BINS] {
             self.sink.drop_row();
@@ -253,8 +270,9 @@ impl Tracer<'_, '_> {
     fn rays(&mut self, start: &Start, most: u32, apart: [bool; BINS]) -> Option<Tally> {
         let mut tally = Tally { apart, ..Tally::default() };
         let mut goal = (most / 16).max(FEWEST).min(most);
+        self.ahead.clear();
         while tally.rays < goal {
-            self.ray(start, &mut tally)?;
+            self.ray(start, goal, &mut tally)?;
             tally.rays += 1;
             if tally.rays == goal {
                 goal = enough(most, goal, tally.blocked);
@@ -316,27 +334,43 @@ impl Tracer<'_, '_> {
         self.sink.end_row(stats, finish, Record::join);
     }
 
-    /// Ray number `tally.rays` of a row and its mirror chain.
-    #[inline]
-    fn ray(&mut self, start: &Start, tally: &mut Tally) -> Option<()> {
-        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+    /// Ray `number` of a row: the bin of its origin, and the ray.
+    #[inline(always)]
+    fn leave(scene: &Scene<'_>, elements: &Elements<'_>, start: &Start, number: u32) -> (usize, Ray) {
+        let (part, index) = (number as usize % PARTS, number / PARTS as u32);
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
         let (a, b) = triangle(p, q);
         let bin = part * PARTS + quarter::into(a, b).0;
-        tally.bins[bin] += 1;
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
-        let (u, v) = self.elements.in_facet(start.element, a, b);
-        let origin = Surface::new(self.scene, start.facet, start.side, u, v);
+        let (u, v) = elements.in_facet(start.element, a, b);
+        let origin = Surface::new(scene, start.facet, start.side, u, v);
         let first = start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz;
+        (bin, origin.leave(first))
+    }
+
+    /// Ray number `tally.rays` of a row, of which `goal` will be sent, and its mirror chain.
+    #[inline]
+    fn ray(&mut self, start: &Start, goal: u32, tally: &mut Tally) -> Option<()> {
+        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+        let sequence = &start.sequences[part];
+        let (bin, mut ray) = Self::leave(self.scene, self.elements, start, tally.rays);
+        let first = ray.direction;
+        tally.bins[bin] += 1;
         // stands for the gradient until the row ends
         let mark = [bin as f32, index as f32];
-        let mut ray = origin.leave(first);
         let (mut word, mut weight) = (EMPTY, 1.0);
         loop {
-            let hit = self.bvh.closest(&ray);
+            let hit = if word == EMPTY {
+                let (scene, elements, now) = (self.scene, self.elements, tally.rays);
+                // the ray at hand is not made twice
+                let any = |n| if n == now { ray } else { Self::leave(scene, elements, start, n).1 };
+                self.bvh.closest_of(&mut self.ahead, now, goal, any)
+            } else {
+                self.bvh.closest(&ray)
+            };
             tally.chain_rays += u32::from(word != EMPTY);
             let Some(hit) = hit else {
                 let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
@@ -345,7 +379,8 @@ impl Tracer<'_, '_> {
             let surface = Surface::of_hit(self.scene, &hit);
             if word == EMPTY {
                 tally.backs[bin] += u32::from(surface.is_none());
-                if tally.apart[bin] && inside(self.bvh, &origin, first) {
+                if tally.apart[bin] && inside(self.bvh, &ray, self.scene.side_normal(start.facet, start.side))
+                {
                     tally.inside[bin] += 1;
                     return Some(());
                 }
