@@ -12,7 +12,7 @@
 use super::sink::Sink;
 use super::word::EMPTY;
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -20,6 +20,7 @@ use crate::math::{Vec3, clamp, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::quarter::{self, QUARTERS};
+use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
@@ -231,8 +232,8 @@ impl Tracer<'_, '_> {
         let mut tally = Tally::default();
         let mut goal = (most / 16).max(FEWEST).min(most);
         while tally.rays < goal {
-            self.ray(&start, &mut tally)?;
-            tally.rays += 1;
+            let count = (goal - tally.rays).min(GROUP as u32);
+            self.batch(&start, &mut tally, count)?;
             if tally.rays == goal {
                 goal = enough(most, goal, tally.blocked);
             }
@@ -290,29 +291,59 @@ impl Tracer<'_, '_> {
         self.sink.end_row(stats, finish, Record::join);
     }
 
-    /// Ray number `tally.rays` of a row and its mirror chain.
+    /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
+    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32) -> Option<()> {
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
+        let mut bins = [0; GROUP];
+        let mut hits = [None; GROUP];
+        let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
+        for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
+            (*ray, *bin) = self.ray(start, number);
+        }
+        self.bvh.closest_many(rays, hits);
+        for ((ray, &hit), &bin) in rays.iter().zip(&*hits).zip(&bins) {
+            self.follow(start, tally, *ray, hit, bin)?;
+            tally.rays += 1;
+        }
+        Some(())
+    }
+
+    /// Ray `number` of a row, and the part of a part from which it starts.
     #[inline]
-    fn ray(&mut self, start: &Start, tally: &mut Tally) -> Option<()> {
-        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+    fn ray(&self, start: &Start, number: u32) -> (Ray, usize) {
+        let (part, index) = (number as usize % PARTS, number / PARTS as u32);
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
         let (a, b) = triangle(p, q);
         let bin = part * PARTS + quarter::into(a, b).0;
-        tally.bins[bin] += 1;
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
         let (u, v) = self.elements.in_facet(start.element, a, b);
         let origin = Surface::new(self.scene, start.facet, start.side, u, v);
-        let first = start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz;
+        (origin.leave(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
+    }
+
+    /// What ray number `tally.rays` of a row finds, of which the first hit is known, and its mirror chain.
+    #[inline]
+    fn follow(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        mut ray: Ray,
+        mut met: Option<Hit>,
+        bin: usize,
+    ) -> Option<()> {
+        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+        let sequence = &start.sequences[part];
+        let first = ray.direction;
+        *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
         let mark = [bin as f32, index as f32];
-        let mut ray = origin.leave(first);
         let (mut word, mut weight) = (EMPTY, 1.0);
         loop {
-            let hit = self.bvh.closest(&ray);
             tally.chain_rays += u32::from(word != EMPTY);
-            let Some(hit) = hit else {
+            let Some(hit) = met else {
                 let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
                 return self.sink.push(escape);
             };
@@ -351,6 +382,7 @@ impl Tracer<'_, '_> {
             word = next;
             weight *= share;
             ray = surface.leave(direction);
+            met = self.bvh.closest(&ray);
         }
     }
 
