@@ -51,6 +51,33 @@ impl External<'_> {
         hit[0] != 0
     }
 
+    /// What the tracer says of many rays, or `tree` where an answer names a facet that the ray does not meet.
+    pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        let mut facets = [NO_FACET; BATCH];
+        for start in (0..rays.len()).step_by(BATCH) {
+            let (rays, hits) = (rays.part(start..rays.len()).head(BATCH), hits.part_mut(start..hits.len()));
+            let facets = facets.head_mut(rays.len());
+            facets.fill(NO_FACET);
+            self.tracer.first(rays, facets);
+            for ((ray, hit), &facet) in rays.iter().zip(hits).zip(&*facets) {
+                *hit = self.hit(ray, facet).unwrap_or_else(|()| traverse::closest(tree, ray));
+            }
+        }
+    }
+
+    /// What the tracer says of many rays.
+    pub fn any_many(&self, rays: &[Ray], occluded: &mut [bool]) {
+        let mut answers = [0; BATCH];
+        for start in (0..rays.len()).step_by(BATCH) {
+            let rays = rays.part(start..rays.len()).head(BATCH);
+            let answers = answers.head_mut(rays.len());
+            answers.fill(0);
+            self.tracer.any(rays, answers);
+            let places = occluded.part_mut(start..occluded.len());
+            places.iter_mut().zip(&*answers).for_each(|(place, answer)| *place = *answer != 0);
+        }
+    }
+
     fn hit(&self, ray: &Ray, facet: u32) -> Result<Option<Hit>, ()> {
         if facet == NO_FACET {
             return Ok(None);

@@ -13,7 +13,7 @@
 use super::sink::Sink;
 use super::word::EMPTY;
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
-use crate::bvh::{Ahead, Bvh};
+use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -22,7 +22,7 @@ use crate::math::{Vec3, clamp, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::quarter::{self, QUARTERS};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
@@ -153,7 +153,7 @@ pub fn fill(
     let sink = Sink::new(&range, scene.bands(), settings.directional, memory)?;
     let wanted = range.len();
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
-    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink, ahead: Ahead::default() };
+    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink };
     for unknown in range {
         if tracer.row(unknown).is_none() {
             tracer.sink.drop_row();
@@ -173,8 +173,6 @@ struct Tracer<'a, 'm> {
     settings: &'a RowSettings,
     mean_area: f64,
     sink: Sink<'m>,
-    /// What a caller's tracer said of a row's first rays.
-    ahead: Ahead,
 }
 
 /// Where the rays of a row start.
@@ -270,10 +268,9 @@ impl Tracer<'_, '_> {
     fn rays(&mut self, start: &Start, most: u32, apart: [bool; BINS]) -> Option<Tally> {
         let mut tally = Tally { apart, ..Tally::default() };
         let mut goal = (most / 16).max(FEWEST).min(most);
-        self.ahead.clear();
         while tally.rays < goal {
-            self.ray(start, goal, &mut tally)?;
-            tally.rays += 1;
+            let count = (goal - tally.rays).min(GROUP as u32);
+            self.batch(start, &mut tally, count)?;
             if tally.rays == goal {
                 goal = enough(most, goal, tally.blocked);
             }
@@ -334,9 +331,26 @@ impl Tracer<'_, '_> {
         self.sink.end_row(stats, finish, Record::join);
     }
 
-    /// Ray `number` of a row: the bin of its origin, and the ray.
-    #[inline(always)]
-    fn leave(scene: &Scene<'_>, elements: &Elements<'_>, start: &Start, number: u32) -> (usize, Ray) {
+    /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
+    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32) -> Option<()> {
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
+        let mut bins = [0; GROUP];
+        let mut hits = [None; GROUP];
+        let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
+        for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
+            (*ray, *bin) = self.ray(start, number);
+        }
+        self.bvh.closest_many(rays, hits);
+        for ((ray, &hit), &bin) in rays.iter().zip(&*hits).zip(&bins) {
+            self.follow(start, tally, *ray, hit, bin)?;
+            tally.rays += 1;
+        }
+        Some(())
+    }
+
+    /// Ray `number` of a row, and the part of a part from which it starts.
+    #[inline]
+    fn ray(&self, start: &Start, number: u32) -> (Ray, usize) {
         let (part, index) = (number as usize % PARTS, number / PARTS as u32);
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
@@ -345,34 +359,31 @@ impl Tracer<'_, '_> {
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
-        let (u, v) = elements.in_facet(start.element, a, b);
-        let origin = Surface::new(scene, start.facet, start.side, u, v);
-        let first = start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz;
-        (bin, origin.leave(first))
+        let (u, v) = self.elements.in_facet(start.element, a, b);
+        let origin = Surface::new(self.scene, start.facet, start.side, u, v);
+        (origin.leave(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
     }
 
-    /// Ray number `tally.rays` of a row, of which `goal` will be sent, and its mirror chain.
+    /// What ray number `tally.rays` of a row finds, of which the first hit is known, and its mirror chain.
     #[inline]
-    fn ray(&mut self, start: &Start, goal: u32, tally: &mut Tally) -> Option<()> {
+    fn follow(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        mut ray: Ray,
+        mut met: Option<Hit>,
+        bin: usize,
+    ) -> Option<()> {
         let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
         let sequence = &start.sequences[part];
-        let (bin, mut ray) = Self::leave(self.scene, self.elements, start, tally.rays);
         let first = ray.direction;
-        tally.bins[bin] += 1;
+        *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
         let mark = [bin as f32, index as f32];
         let (mut word, mut weight) = (EMPTY, 1.0);
         loop {
-            let hit = if word == EMPTY {
-                let (scene, elements, now) = (self.scene, self.elements, tally.rays);
-                // the ray at hand is not made twice
-                let any = |n| if n == now { ray } else { Self::leave(scene, elements, start, n).1 };
-                self.bvh.closest_of(&mut self.ahead, now, goal, any)
-            } else {
-                self.bvh.closest(&ray)
-            };
             tally.chain_rays += u32::from(word != EMPTY);
-            let Some(hit) = hit else {
+            let Some(hit) = met else {
                 let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
                 return self.sink.push(escape);
             };
@@ -415,6 +426,7 @@ impl Tracer<'_, '_> {
             word = next;
             weight *= share;
             ray = surface.leave(direction);
+            met = self.bvh.closest(&ray);
         }
     }
 
