@@ -10,7 +10,7 @@
 //! for what is seen.
 
 use super::sink::Sink;
-use super::word::EMPTY;
+use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::bvh::Bvh;
 use crate::element::Elements;
@@ -309,6 +309,7 @@ impl Tracer<'_, '_> {
         let mark = [bin as f32, index as f32];
         let mut ray = origin.leave(first);
         let (mut word, mut weight) = (EMPTY, 1.0);
+        let ray_start = self.sink.used();
         loop {
             let hit = self.bvh.closest(&ray);
             tally.chain_rays += u32::from(word != EMPTY);
@@ -331,7 +332,12 @@ impl Tracer<'_, '_> {
             let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
             let depth = self.sink.words.get(word).depth;
             if depth >= self.settings.mirrors {
-                tally.lost += weight * self.sink.words.largest(word);
+                let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
+                let rest = weight * self.sink.words.largest(word) * rho;
+                tally.lost += rest;
+                if depth as usize >= LONGEST {
+                    self.sink.close(ray_start, rest);
+                }
                 return Some(());
             }
             let next = match self.sink.spell(word, mirror.class, self.scene) {
@@ -343,7 +349,9 @@ impl Tracer<'_, '_> {
                 Err(false) => return None,
             };
             if self.sink.words.largest(next) * weight < self.settings.cutoff {
-                tally.lost += weight * self.sink.words.largest(next);
+                let rest = weight * self.sink.words.largest(next);
+                tally.lost += rest;
+                self.sink.close(ray_start, rest);
                 return Some(());
             }
             let (s, t) = lobe_point(sequence, index, depth);

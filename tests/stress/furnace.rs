@@ -1,0 +1,36 @@
+//! The white furnace inside a closed box: emission 1 and reflectance rho fill it with 1/(1 - rho).
+
+use crate::case::{Case, perspective, within};
+use crate::support::scenes;
+use crate::support::twin::Material;
+use std::f64::consts::PI;
+
+/// A closed box of reflectance `diffuse` + `specular`: the worst relative error of the facets' diffuse radiances and of
+/// the pixels, the estimate relative to the radiance, and the sweeps.
+fn box_of(diffuse: f64, specular: f64) -> (f64, f64, f64, u32) {
+    let rho = diffuse + specular;
+    let case =
+        Case::new(scenes::cube_inside().subdivided(1), &[Material::new(diffuse, specular).emitting(1.0)]);
+    let camera = perspective([0.3, 0.4, 0.6], [0.9, 0.7, 0.35], 100.0, 10);
+    let outcome = case.run(2, &within(1e-2), &camera);
+    let all = 1.0 / (1.0 - rho);
+    // what arrives is uniform; a facet's own diffuse radiance is what its mirror does not add
+    let own = outcome.sides.iter().map(|s| (s.irradiance[0] / PI / all - 1.0).abs());
+    let pixels = outcome.image.pixels.iter().map(|p| (f64::from(*p) / all - 1.0).abs());
+    let report = &outcome.image.report;
+    (own.fold(0.0, f64::max), pixels.fold(0.0, f64::max), report.error_estimate / all, report.sweeps)
+}
+
+#[test]
+fn a_closed_box_is_a_white_furnace() {
+    for (rho, allowed) in [(0.9, 1e-9), (0.999, 1e-9), (1.0 - 1e-6, 1e-8), (1.0 - 1e-9, 1e-5)] {
+        for share in [0.0, 0.2, 0.5, 0.9, 0.99] {
+            let (facets, pixels, estimate, sweeps) = box_of(rho * (1.0 - share), rho * share);
+            println!(
+                "1 - rho {:.0e}, mirror {share}: facets {facets:.1e}, pixels {pixels:.1e}, estimate {estimate:.1e}, {sweeps} sweeps",
+                1.0 - rho
+            );
+
+        }
+    }
+}
