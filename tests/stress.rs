@@ -1,7 +1,19 @@
-//! Hostile scenes: nothing breaks, nothing lies. The measured errors are kept in tests/stress.md.
+//! Hostile scenes: nothing breaks, nothing lies. What was measured stands in tests/stress.md.
 
 #[path = "support/case.rs"]
 mod case;
+#[path = "stress/docs.rs"]
+mod docs;
 #[path = "stress/furnace.rs"]
 mod furnace;
+#[path = "stress/geometry.rs"]
+mod geometry;
+#[path = "stress/hostile.rs"]
+mod hostile;
+#[path = "support/judge/mod.rs"]
+mod judge;
+#[path = "support/kernel.rs"]
+mod kernel;
+#[path = "stress/measure.rs"]
+mod measure;
 mod support;
