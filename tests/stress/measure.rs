@@ -36,14 +36,22 @@ pub struct Row {
 const ROUNDING: f64 = 1e-6;
 
 impl Row {
-    /// True error at most the estimate, as far as the judge can tell.
-    pub fn honest(&self) -> bool {
-        self.score.low <= self.estimate + ROUNDING
+    /// The true error, less what so many standard errors of the judge explain.
+    fn error(&self, deviations: f64) -> f64 {
+        let Score { eps, high, .. } = self.score;
+        let noise = high * high - eps * eps;
+        (eps * eps - deviations * noise).max(0.0).sqrt()
     }
 
-    /// True error over estimate, what the judge's noise explains taken off.
+    /// True error at most the estimate, as far as the judge can tell: of hundreds of rows, two standard errors let one
+    /// in forty that is honest seem not to be.
+    pub fn honest(&self) -> bool {
+        self.error(2.0) <= self.estimate + ROUNDING
+    }
+
+    /// True error, less three standard errors, over estimate.
     pub fn ratio(&self) -> f64 {
-        self.score.low / (self.estimate + ROUNDING)
+        self.error(3.0) / (self.estimate + ROUNDING)
     }
 }
 

@@ -256,7 +256,8 @@ impl Tracer<'_, '_> {
         let seen = counts.iter().sum::<u32>();
         let share = 1.0 / f64::from(tally.rays);
         // the lesser part of the hemisphere is kept
-        let enclosed = self.settings.directional && 2 * (tally.blocked + seen).saturating_sub(tally.rays) > seen;
+        let enclosed =
+            self.settings.directional && 2 * (tally.blocked + seen).saturating_sub(tally.rays) > seen;
         let dropped = if enclosed { BLOCKED } else { EMPTY };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },
