@@ -16,4 +16,6 @@ mod judge;
 mod kernel;
 #[path = "stress/measure.rs"]
 mod measure;
+#[path = "stress/rays.rs"]
+mod rays;
 mod support;

@@ -85,7 +85,8 @@ impl System<'_> {
                 if let Some(sun) = &self.light.sun {
                     irradiance += self.sun.at(unknown) * sun.irradiance(band);
                 }
-                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance;
+                // what slopes add may be negative, where next to nothing arrives
+                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance.max(0.0);
                 let old = from.at(unknown * bands + band);
                 let reference = reference.at(band);
                 let step = fabs(new - old);
@@ -176,6 +177,7 @@ impl System<'_> {
                     *square += l * l * record.weight;
                 }
             }
+            mean.iter_mut().for_each(|mean| *mean = mean.max(0.0));
             damp(first, second, &square, row.row.rays);
         }
         Ok(())
