@@ -1,5 +1,7 @@
 //! Hostile scenes: nothing breaks, nothing lies. What was measured stands in tests/stress.md.
 
+#[path = "stress/budget.rs"]
+mod budget;
 #[path = "support/case.rs"]
 mod case;
 #[path = "stress/docs.rs"]
@@ -16,6 +18,12 @@ mod judge;
 mod kernel;
 #[path = "stress/measure.rs"]
 mod measure;
+#[path = "stress/position.rs"]
+mod position;
+#[path = "stress/properties.rs"]
+mod properties;
+#[path = "stress/radiometry.rs"]
+mod radiometry;
 #[path = "stress/rays.rs"]
 mod rays;
 mod support;

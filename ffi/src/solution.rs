@@ -651,7 +651,7 @@ impl Solve<'_> {
             })?;
             core::mem::swap(&mut latest, &mut next);
             if solver.took(change.into_inner()) {
-                history.note(next, latest, bands);
+                history.note(next, latest, bands, |at| self.system.weight(at));
             }
         }
         Ok([latest, next])

@@ -461,7 +461,7 @@ impl Host {
             let changes = self.split(next, bands, |range, out| Ok(sweep(range, latest, out, relaxation)))?;
             core::mem::swap(latest, next);
             if solver.took(changes.into_iter().fold(0.0, f64::max)) {
-                history.note(next, latest, bands);
+                history.note(next, latest, bands, |at| system.weight(at));
             }
         }
         Ok(())

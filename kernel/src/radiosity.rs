@@ -113,6 +113,17 @@ impl System<'_> {
         }
     }
 
+    /// Area over rho_d, in scene units, of the value `at` a table of one value per unknown and band: what makes fluxes of
+    /// radiances for [`crate::solver::History`]; 0 where nothing is reflected.
+    pub fn weight(&self, at: usize) -> f64 {
+        let bands = self.shape.bands.max(1);
+        let (unknown, band) = (at / bands, at % bands);
+        let facet = self.elements.facet_of(unknown).0;
+        let rho = self.scene.diffuse(self.scene.material(facet)).at(band);
+        let area = self.scene.areas().at(facet) * self.elements.share(unknown);
+        if rho > 0.0 { area / rho } else { 0.0 }
+    }
+
     /// [`System::relaxed_sweep`] of the system whose source is 1 everywhere; returns the largest increase.
     pub fn unit_sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], relaxation: f64) -> f64 {
         let bands = self.shape.bands.clamp(1, MAX_BANDS);

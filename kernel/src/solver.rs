@@ -20,9 +20,6 @@ use crate::scene::{MAX_BANDS, Scene};
 /// Solutions that [`History`] keeps.
 const KEPT: usize = 3;
 
-/// Columns of its least squares: differences of the solutions' changes, and the deficits.
-const COLUMNS: usize = KEPT + 1;
-
 /// More plain sweeps than this are not made where faster ones may be.
 const PLAIN: u32 = 48;
 
@@ -210,7 +207,8 @@ impl Solver {
     /// [`Error::Diverges`] where none was found; `row_sum` is what rows add up to.
     pub fn inverse(&self, solution: &[f64], row_sum: f64) -> Result<f64, Error> {
         let (low, high) = solution.iter().fold((0.0, 0.0), |(a, b), &v| (f64::min(a, v), f64::max(b, v)));
-        if self.error <= self.goal && low >= 0.0 && high.is_finite() {
+        // beyond, a sweep's increase of 1 drowns in rounding
+        if self.error <= self.goal && low >= 0.0 && high < 1.0 / (1.0 - CLOSED) {
             Ok(high.max(1.0) / (1.0 - self.error.max(0.0)))
         } else {
             Err(Error::Diverges { row_sum })
@@ -236,7 +234,8 @@ impl<'m> History<'m> {
     }
 
     /// Keeps `old`, or replaces `new`, which a plain sweep made of it, by what they all lead to in each of `bands`.
-    pub fn note(&mut self, old: &[f64], new: &mut [f64], bands: usize) {
+    /// `weight` of each value: the element's area over rho_d, so that sums are fluxes.
+    pub fn note(&mut self, old: &[f64], new: &mut [f64], bands: usize, weight: impl Fn(usize) -> f64) {
         let size = old.len();
         if self.solutions.len() < KEPT * size {
             return;
@@ -249,38 +248,53 @@ impl<'m> History<'m> {
         }
         self.filled = 0;
         for band in 0..bands.min(MAX_BANDS) {
-            self.extrapolate(old, new, bands, band);
+            self.extrapolate(old, new, bands, band, &weight);
         }
     }
 
-    /// The combination of the solutions and of 1 everywhere whose change is least: with the changes d_0 (the latest)
-    /// to d_3, new + t_0 - t_1 d_0 - t_2 d_1 - t_3 d_2, where t is the least squares of d_0 by the deficits and the
-    /// differences of neighbouring changes.
+    /// The combination of the solutions whose change is least, new - t_0 d_0 - t_1 d_1 - t_2 d_2 with the changes d_0
+    /// (the latest) to d_3 and the least squares t of d_0 by the differences of neighbouring ones; and 1 everywhere so
+    /// often that the flux of what is left of the change balances.
     ///
-    /// The deficits are known to rounding where the differences drown in that of the solutions: a room of reflectance
-    /// 1 - 1e-9 is filled at once.
-    fn extrapolate(&self, old: &[f64], new: &mut [f64], bands: usize, band: usize) {
+    /// What mirrors and walls absorb of a radiance of 1 is known to rounding, where the differences drown in that of the
+    /// solutions: a room of reflectance 1 - 1e-9 is filled at once.
+    fn extrapolate(
+        &self,
+        old: &[f64],
+        new: &mut [f64],
+        bands: usize,
+        band: usize,
+        weight: &impl Fn(usize) -> f64,
+    ) {
         let size = old.len();
         let changes = |at: usize, new: f64| {
             let [a, b, c] = [0, 1, 2].map(|k| self.solutions.at(k * size + at));
             let x = old.at(at);
             [new - x, x - c, c - b, b - a]
         };
-        let (mut gram, mut right) = ([[0.0; COLUMNS]; COLUMNS], [0.0; COLUMNS]);
+        let steps = |d: [f64; 4]| [d[0] - d[1], d[1] - d[2], d[2] - d[3]];
+        let (mut gram, mut right) = ([[0.0; KEPT]; KEPT], [0.0; KEPT]);
         for (at, &value) in new.iter().enumerate().skip(band).step_by(bands.max(1)) {
             let d = changes(at, value);
-            let columns = [self.deficits.at(at), d[0] - d[1], d[1] - d[2], d[2] - d[3]];
+            let columns = steps(d);
             for ((row, right), x) in gram.iter_mut().zip(&mut right).zip(columns) {
                 row.iter_mut().zip(columns).for_each(|(m, y)| *m += x * y);
                 *right += x * d[0];
             }
         }
         let theta = least_squares(gram, right);
+        let product = |values: &[f64]| theta.iter().zip(values).map(|(t, x)| t * x).sum::<f64>();
+        let (mut left, mut made_up) = (0.0, 0.0);
+        for (at, &value) in new.iter().enumerate().skip(band).step_by(bands.max(1)) {
+            let d = changes(at, value);
+            let weight = weight(at);
+            left += weight * (d[0] - product(&steps(d)));
+            made_up += weight * self.deficits.at(at);
+        }
+        let level = if made_up > 0.0 { left / made_up } else { 0.0 };
         for (at, value) in new.iter_mut().enumerate().skip(band).step_by(bands.max(1)) {
-            let d = changes(at, *value);
-            let step: f64 = theta.iter().skip(1).zip(d).map(|(t, d)| t * d).sum();
             // radiances and their bound are not negative
-            let next = (*value - step + theta.at(0)).max(0.0);
+            let next = (*value - product(&changes(at, *value)) + level).max(0.0);
             if fabs(next) < f64::INFINITY {
                 *value = next;
             }
@@ -289,11 +303,11 @@ impl<'m> History<'m> {
 }
 
 /// Solves the normal equations by elimination; what depends on those before, to rounding, is left out.
-fn least_squares(mut gram: [[f64; COLUMNS]; COLUMNS], mut right: [f64; COLUMNS]) -> [f64; COLUMNS] {
+fn least_squares(mut gram: [[f64; KEPT]; KEPT], mut right: [f64; KEPT]) -> [f64; KEPT] {
     /// A column that the others explain to 1e-5 of its length says nothing of its own.
     const DEPENDENT: f64 = 1e-10;
-    let squares = [gram[0][0], gram[1][1], gram[2][2], gram[3][3]];
-    let mut used = [false; COLUMNS];
+    let squares = [gram[0][0], gram[1][1], gram[2][2]];
+    let mut used = [false; KEPT];
     for (k, (used, square)) in used.iter_mut().zip(squares).enumerate() {
         let row = gram.at(k);
         let (pivot, own) = (row.at(k), right.at(k));
@@ -307,8 +321,8 @@ fn least_squares(mut gram: [[f64; COLUMNS]; COLUMNS], mut right: [f64; COLUMNS])
             *right -= factor * own;
         }
     }
-    let mut theta = [0.0; COLUMNS];
-    for k in (0..COLUMNS).rev().filter(|&k| used.at(k)) {
+    let mut theta = [0.0; KEPT];
+    for k in (0..KEPT).rev().filter(|&k| used.at(k)) {
         let row = gram.at(k);
         let rest: f64 = row.iter().zip(theta).skip(k + 1).map(|(m, t)| m * t).sum();
         let value = (right.at(k) - rest) / row.at(k);
@@ -345,7 +359,7 @@ mod tests {
             }
             core::mem::swap(&mut x, &mut next);
             if solver.took(change) {
-                history.note(&next, &mut x, 1);
+                history.note(&next, &mut x, 1, |_| 1.0);
             }
         }
         (x, next, solver)

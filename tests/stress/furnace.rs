@@ -1,5 +1,6 @@
 //! The white furnace inside a closed box: emission 1 and reflectance rho fill it with 1/(1 - rho).
 
+use crate::budget::{Allowed, PIXEL, SOLVE, SOLVE_BRIGHT, SOLVE_BRIGHTEST};
 use crate::case::{Case, perspective, within};
 use crate::support::scenes;
 use crate::support::twin::Material;
@@ -22,8 +23,8 @@ fn box_of(diffuse: f64, specular: f64) -> (f64, f64, f64, u32) {
 
 #[test]
 fn a_closed_box_is_a_white_furnace() {
-    // 1e-9 where rounding allows: a row's sum, of thousands of terms, is known to some 1e-14, which 1/(1 - rho) magnifies
-    for (rho, allowed) in [(0.999, 1e-9), (1.0 - 1e-6, 2e-8), (1.0 - 1e-9, 2e-5)] {
+    let brightness = [(0.999, SOLVE), (1.0 - 1e-6, SOLVE_BRIGHT), (1.0 - 1e-9, SOLVE_BRIGHTEST)];
+    for (rho, Allowed { error: allowed, .. }) in brightness {
         for share in [0.0, 0.2, 0.5, 0.9, 0.99] {
             let (facets, pixels, estimate, sweeps) = box_of(rho * (1.0 - share), rho * share);
             let what = format!("1 - rho {:.0e}, of which mirror {share}", 1.0 - rho);
@@ -31,8 +32,8 @@ fn a_closed_box_is_a_white_furnace() {
                 "{what}: facets {facets:.1e}, pixels {pixels:.1e}, estimate {estimate:.1e}, {sweeps} sweeps"
             );
             assert!(facets <= allowed && pixels <= allowed, "{what}: {facets:.1e} {pixels:.1e}");
-            // an estimate is one of pixels, which f32 rounds
-            assert!(pixels <= estimate + 6e-8, "{what}: {pixels:.1e}, estimated {estimate:.1e}");
+            // the estimate is one of the exact pixels
+            assert!(pixels <= estimate + PIXEL.error, "{what}: {pixels:.1e}, estimated {estimate:.1e}");
             assert!(sweeps <= 400, "{what}: {sweeps} sweeps");
         }
     }
