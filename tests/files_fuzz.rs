@@ -148,7 +148,9 @@ fn fuzz(name: &str, extensions: &[&str], count: u64, read: Reader) {
 
 #[test]
 fn damaged_scene_files_are_read_or_refused() {
-    fuzz("scene files", &["toml"], 12_000, |path| scene_file::read(path).map(drop).map_err(|e| e.to_string()));
+    fuzz("scene files", &["toml"], 12_000, |path| {
+        scene_file::read(path).map(drop).map_err(|e| e.to_string())
+    });
 }
 
 #[test]
