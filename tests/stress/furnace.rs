@@ -1,9 +1,12 @@
 //! The white furnace inside a closed box: emission 1 and reflectance rho fill it with 1/(1 - rho).
 
-use crate::budget::{Allowed, PIXEL, SOLVE, SOLVE_BRIGHT, SOLVE_BRIGHTEST};
+use crate::budget::{Allowed, FURNACE, PIXEL, SOLVE, SOLVE_BRIGHT, SOLVE_BRIGHTEST};
 use crate::case::{Case, perspective, within};
 use crate::support::scenes;
 use crate::support::twin::Material;
+use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::ray::Ray;
+use glam::{DVec3, dvec3};
 use std::f64::consts::PI;
 
 /// A closed box of reflectance `diffuse` + `specular`: the worst relative error of the facets' diffuse radiances and of
@@ -37,4 +40,32 @@ fn a_closed_box_is_a_white_furnace() {
             assert!(sweeps <= 400, "{what}: {sweeps} sweeps");
         }
     }
+}
+
+#[test]
+fn chains_that_meet_edges_and_corners_stay_within() {
+    // mirrors all around: a chain that slips out between two of them comes back dark
+    let rho = 0.9;
+    let mesh = scenes::cube_inside().translated([-0.5; 3]).scaled(2.0);
+    let case = Case::new(mesh, &[Material::new(0.05, rho - 0.05).emitting(1.0 - rho)]);
+    let steps = [-1.0, -0.75, -0.5, 0.0, 0.25, 0.5, 1.0];
+    case.with_lit(2, &within(1e-2), |_, lit| {
+        let solved = lit.solved();
+        for origin in [DVec3::ZERO, dvec3(0.25, 0.0, 0.0), dvec3(0.5, -0.25, 0.125)] {
+            for (x, y, z) in
+                steps.iter().flat_map(|x| steps.iter().flat_map(move |y| steps.map(|z| (*x, *y, z))))
+            {
+                // toward a grid on the walls: their corners, edges, diagonals
+                let aim = dvec3(x, y, z) - origin;
+                if aim.abs().max_element() == 0.0 {
+                    continue;
+                }
+                let ray = Ray::new(solved.scene.to_scene(origin), aim.normalize());
+                let mut terms = Terms::ZERO;
+                solved.radiance(&ray, Sample::Alone(1), &mut terms);
+                let off = (terms.sum(0) - 1.0).abs();
+                assert!(off <= FURNACE.error, "from {origin} to {x} {y} {z}: off by {off:.1e}");
+            }
+        }
+    });
 }
