@@ -1,5 +1,7 @@
 //! Hostile scenes: nothing breaks, nothing lies. What was measured stands in tests/stress.md.
 
+#[path = "stress/bits.rs"]
+mod bits;
 #[path = "stress/budget.rs"]
 mod budget;
 #[path = "support/case.rs"]

@@ -614,14 +614,14 @@ impl Solve<'_> {
                 [&mut *from, &mut *to],
                 history,
                 runner,
-                &|range, from, to, relax| self.system.unit_sweep(range, from, to, relax),
+                |range, from, to, relax| self.system.unit_sweep(range, from, to, relax),
             )?;
             inverse = Some(unit.inverse(ends[1], q)?);
             before = unit.done;
         }
         self.start(from, runner)?;
         let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
-        let ends = self.iterate(&mut solver, [from, to], history, runner, &|range, from, to, relax| {
+        let ends = self.iterate(&mut solver, [from, to], history, runner, |range, from, to, relax| {
             self.system.relaxed_sweep(range, from, to, self.reference, relax)
         })?;
         let [latest, _] = ends;
@@ -637,7 +637,7 @@ impl Solve<'_> {
         [mut latest, mut next]: [&'o mut [f64]; 2],
         history: &mut [f64],
         runner: &mut Runner,
-        sweep: &(dyn Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync),
+        sweep: impl Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync,
     ) -> Result<[&'o [f64]; 2], blik_error> {
         let bands = self.system.shape.bands;
         let mut history = History::new(history, latest.len());

@@ -149,7 +149,7 @@ fn sheets(s: usize, rng: &mut Rng) -> Shape {
     slab.rectangle(dvec3(-0.5, -0.5, 0.0), DVec3::X, DVec3::Y, 1, 1);
     slab.rectangle(dvec3(-0.5, -0.5, -small(s)), DVec3::Y, DVec3::X, 1, 2);
     let slab = slab.rotated([1.0, 0.4, 0.0], 0.5 + 0.5 * rng.unit()).translated([0.0, 0.0, 0.7]);
-    (floor(2).joined(&slab), s % 2 == 0)
+    (floor(2).joined(&slab), s.is_multiple_of(2))
 }
 
 /// Blocks that meet at an edge and at a corner, or nearly.

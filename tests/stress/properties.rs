@@ -8,9 +8,9 @@ use crate::support::twin::{Material, Rng};
 use blik_kernel::sky::SkyModel;
 use proptest::prelude::*;
 
-/// Cases of a property: a few, or as many as `PROPTEST_CASES` says.
+/// Cases of a property, each of which solves several scenes: a few, or as many as `PROPTEST_CASES` says up to 1000.
 fn cases() -> u32 {
-    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(12)
+    std::env::var("PROPTEST_CASES").ok().and_then(|n| n.parse().ok()).map_or(12, |n: u32| n.min(1000))
 }
 
 /// A two-sided soup of `count` triangles of three materials, of reflectance up to `most`; emission makes up for what
