@@ -1,6 +1,6 @@
 //! Light and reflectances at the ends of their ranges.
 
-use crate::budget::{LIGHT_SCALE, SLOPE};
+use crate::budget::{LIGHT_SCALE, PIXEL, SLOPE};
 use crate::case::{Case, SkyOf, SunOf, orthographic, outcome, within};
 use crate::support::scenes;
 use crate::support::twin::Material;
@@ -63,7 +63,9 @@ fn darkness_is_dark_and_one_lit_facet_lights_all() {
     let mut materials = [Material::new(0.5, 0.2), Material::new(0.5, 0.0), Material::new(0.5, 0.0)];
     let dark = Case::new(scenes::corner(1), &materials).run(2, &within(1e-2), &view());
     let brightest = dark.image.pixels.iter().fold(0f32, |a, p| a.max(*p));
-    assert_eq!((brightest, dark.image.report.error_estimate), (0.0, 0.0));
+    assert_eq!(brightest, 0.0);
+    // every estimate has the rounding of f32 pixels in it
+    assert!(dark.image.report.error_estimate <= 2.0 * PIXEL.error);
     materials[0] = Material::new(0.5, 0.2).emitting(1.0);
     let lit = Case::new(scenes::corner(1), &materials).run(2, &within(1e-2), &view());
     assert!(lit.sides.iter().all(|s| s.facet < 2 || s.irradiance[0] > 0.0));

@@ -144,7 +144,7 @@ fn relax(
     }
     report.contraction = system.contraction(0..unknowns);
     let goal = settings.solver.max(1e-15);
-    let mut sweeps = Sweeps::until(report.contraction, goal, None);
+    let mut sweeps = Sweeps::until(report.contraction, goal);
     let mut next = radiance.clone();
     // from no light, the first change is the brightest radiance before interreflection
     let (mut scale, mut before, mut decay) = (0.0, 0.0, f64::INFINITY);
