@@ -1,6 +1,9 @@
 //! Baked blocks give the same bits as what they were baked from, and hostile ones are refused or do no harm; no numbers
-//! that a caller may hand over make the interface panic or give NaN. Seeded: every run tries the same; with
+//! that a caller may hand over make the interface panic or give NaN; nor does memory that is refused. Seeded: every run tries the same; with
 //! `BLIK_FUZZ_SECONDS` it goes on for so long.
+
+#[path = "stress/ffi_faults.rs"]
+mod faults;
 
 use blik::*;
 use std::ffi::c_void;
@@ -197,8 +200,8 @@ fn with_light<R>(inputs: &Inputs, with: impl FnOnce(&blik_light) -> R) -> R {
     with(&blik_light { sky: &sky, sun: &sun, ..init(blik_light_init) })
 }
 
-/// From the inputs to a solution, as far as it goes.
-fn prepare(inputs: &Inputs) -> Option<Handles> {
+/// The mesh of `inputs`, handed to `with`.
+fn with_mesh<R>(inputs: &Inputs, with: impl FnOnce(&blik_mesh) -> R) -> R {
     let [d0, s0, e0, d1, s1, e1] = inputs.values.each_ref().map(|v| v.as_ptr());
     let material = |diffuse, specular, emission, ratio| blik_material {
         diffuse,
@@ -215,12 +218,17 @@ fn prepare(inputs: &Inputs) -> Option<Handles> {
     mesh.facet_materials.count = inputs.facet_materials.len();
     (mesh.materials, mesh.material_count, mesh.bands) = (materials.as_ptr(), 2, 2);
     mesh.two_sided = inputs.choices[2];
+    with(&mesh)
+}
+
+/// From the inputs to a solution, as far as it goes.
+fn prepare(inputs: &Inputs) -> Option<Handles> {
     let mut settings = init(blik_settings_init);
     (settings.tolerance, settings.max_bounces) = (inputs.tolerance, inputs.max_bounces);
     let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
     // SAFETY: arrays as long as stated; what their numbers are is what is tested.
     unsafe {
-        if refused(blik_scene_create(&mesh, null_mut(), &mut made.scene))
+        if refused(with_mesh(inputs, |mesh| blik_scene_create(mesh, null_mut(), &mut made.scene)))
             || refused(blik_coupling_create(made.scene, &settings, null(), null_mut(), &mut made.coupling))
         {
             return None;

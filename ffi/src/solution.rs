@@ -13,10 +13,11 @@ use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::chain::Solved;
 use blik_kernel::coupling::{Block, Coupling, sink};
 use blik_kernel::light::{self, Light, Shape};
-use blik_kernel::policy::{self, Sweeps};
+use blik_kernel::policy;
 use blik_kernel::radiosity::System;
 use blik_kernel::scene::MAX_BANDS;
 use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use blik_kernel::solver::{self, History, Solver};
 use blik_kernel::sun::{Sun, SunInput};
 use blik_kernel::sun_image::{self, Noting, SunImages};
 use core::ffi::c_void;
@@ -237,7 +238,11 @@ impl Sizes {
         Ok(Sizes {
             shape,
             unknowns,
-            orders: if shape.levels == 1 { 2 } else { shape.levels + 1 },
+            orders: if shape.levels == 1 {
+                2 + solver::kept(scene, coupling.settings.tolerance, max_bounces)
+            } else {
+                shape.levels + 1
+            },
             samples,
             beams,
             images,
@@ -558,7 +563,7 @@ impl Solve<'_> {
         orders: &'o mut [f64],
         irradiance: &mut [f64],
         runner: &mut Runner,
-    ) -> Result<(Option<Sweeps>, &'o [f64]), blik_error> {
+    ) -> Result<(Option<Solver>, &'o [f64]), blik_error> {
         let shape = self.system.shape;
         let size = self.system.elements.unknowns() * shape.bands;
         let short = blik_error::of(BLIK_ERROR_INTERNAL);
@@ -567,9 +572,9 @@ impl Solve<'_> {
             let last = orders.get(size * shape.levels..).ok_or(short)?;
             return Ok((None, last));
         }
-        let (from, to) = orders.split_at_mut_checked(size).ok_or(short)?;
-        self.start(from, runner)?;
-        let (sweeps, radiance) = self.converge(from, to, runner)?;
+        let (from, rest) = orders.split_at_mut_checked(size).ok_or(short)?;
+        let (to, history) = rest.split_at_mut_checked(size).ok_or(short)?;
+        let (sweeps, radiance) = self.converge(from, to, history, runner)?;
         runner.rows(irradiance, shape.stride(), SHARES[3], |range, out| {
             self.system.gather(range, 0, |_| radiance, out)
         })?;
@@ -585,30 +590,73 @@ impl Solve<'_> {
 
     fn converge<'o>(
         &self,
-        mut from: &'o mut [f64],
-        mut to: &'o mut [f64],
+        from: &'o mut [f64],
+        to: &'o mut [f64],
+        history: &mut [f64],
         runner: &mut Runner,
-    ) -> Result<(Sweeps, &'o [f64]), blik_error> {
+    ) -> Result<(Solver, &'o [f64]), blik_error> {
         let largest = Turns::new(0.0);
         runner.ranges(self.system.elements.unknowns(), SHARES[2], |range| {
             let q = self.system.contraction(range);
             largest.with(|all| *all = f64::max(*all, q));
             Ok(())
         })?;
-        let mut sweeps =
-            Sweeps::new(largest.into_inner(), self.settings.tolerance, self.settings.max_bounces);
-        while sweeps.more() {
+        let Settings { tolerance, max_bounces, .. } = *self.settings;
+        let (q, mut inverse, mut before) = (largest.into_inner(), None, 0);
+        let deficits = history.get_mut(..from.len()).unwrap_or_default();
+        runner.rows(deficits, self.system.shape.bands, 0.0, |range, out| {
+            self.system.deficits(range, out);
+            Ok(())
+        })?;
+        if Solver::is_closed(q, max_bounces) {
+            from.fill(0.0);
+            let mut unit = Solver::unit();
+            let ends = self.iterate(
+                &mut unit,
+                [&mut *from, &mut *to],
+                history,
+                runner,
+                |range, from, to, relax| self.system.unit_sweep(range, from, to, relax),
+            )?;
+            inverse = Some(unit.inverse(ends[1], q)?);
+            before = unit.done;
+        }
+        self.start(from, runner)?;
+        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
+        let ends = self.iterate(&mut solver, [from, to], history, runner, |range, from, to, relax| {
+            self.system.relaxed_sweep(range, from, to, self.reference, relax)
+        })?;
+        let [latest, _] = ends;
+        solver.finish(latest, self.reference, max_bounces);
+        solver.done += before;
+        Ok((solver, latest))
+    }
+
+    /// Iterates to the end: the latest solution, and the one before.
+    fn iterate<'o>(
+        &self,
+        solver: &mut Solver,
+        [mut latest, mut next]: [&'o mut [f64]; 2],
+        history: &mut [f64],
+        runner: &mut Runner,
+        sweep: impl Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync,
+    ) -> Result<[&'o [f64]; 2], blik_error> {
+        let bands = self.system.shape.bands;
+        let mut history = History::new(history, latest.len());
+        while solver.more() {
             let change = Turns::new(0.0);
-            let seen = &*from;
-            runner.rows(to, self.system.shape.bands, 0.0, |range, out| {
-                let own = self.system.sweep(range, seen, out, self.reference);
+            let (seen, relaxation) = (&*latest, solver.relaxation());
+            runner.rows(next, bands, 0.0, |range, out| {
+                let own = sweep(range, seen, out, relaxation);
                 change.with(|all| *all = f64::max(*all, own));
                 Ok(())
             })?;
-            core::mem::swap(&mut from, &mut to);
-            sweeps.took(change.into_inner())?;
+            core::mem::swap(&mut latest, &mut next);
+            if solver.took(change.into_inner()) {
+                history.note(next, latest, bands, |at| self.system.weight(at));
+            }
         }
-        Ok((sweeps, from))
+        Ok([latest, next])
     }
 
     /// Each order of reflection from those before it.

@@ -233,6 +233,9 @@ const LOBE_GOAL: f64 = 1.5;
 const FEWEST_LOBE_RAYS: u32 = 4;
 const MOST_LOBE_RAYS: f64 = 1024.0;
 
+/// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
+const MOST_CLOSED: f64 = 0.5;
+
 /// The rays of one lobe so far: sums over them.
 struct Fan<'w> {
     terms: &'w mut Terms,
@@ -342,6 +345,7 @@ impl Solved<'_> {
                 || leg.mirrors as usize >= crate::coupling::word::LONGEST
             {
                 path.tail += largest * self.brightest;
+                self.close(&leg, terms);
                 return;
             }
             leg.mirrors += 1;
@@ -369,6 +373,22 @@ impl Solved<'_> {
             }
             path.rays += 1;
             hit = self.bvh.closest(&leg.ray);
+        }
+    }
+
+    /// The rest of a chain that is not followed any more: it is taken to go on as it went so far, S + t S + t^2 S ... =
+    /// S/(1 - t) with the product t of its mirrors. Where all facets shine alike that is exact; it adds no more than
+    /// the part that the bound on the tail allows for. Lobes, which lose light at grazing angles, are left as they are.
+    #[cold]
+    fn close(&self, leg: &Leg, terms: &mut Terms) {
+        if leg.lobes > 0 {
+            return;
+        }
+        for (band, &through) in leg.through.head(self.shape.bands).iter().enumerate() {
+            if through <= MOST_CLOSED {
+                let all = terms.mirror_diffuse.at(band) + terms.sum(band) * through / (1.0 - through);
+                terms.mirror_diffuse.set(band, all);
+            }
         }
     }
 

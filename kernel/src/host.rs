@@ -22,14 +22,16 @@ use crate::element::Elements;
 use crate::error::Error;
 use crate::facets;
 use crate::image::{self, Tally, Target};
+use crate::index::IndexMut;
 use crate::light::{self, Light, Shape};
 use crate::math::Vec3;
-use crate::policy::{self, Sweeps};
+use crate::policy;
 use crate::radiosity::System;
 use crate::scene::{Scene, SceneInput};
 use crate::signature::{self, Signature, Sums, View};
 use crate::simd::Isa;
 use crate::sky::{Sky, SkyInput};
+use crate::solver::{self, History, Solver};
 use crate::subdivide::Cut;
 use crate::sun::{Sun, SunInput};
 use crate::sun_image::{self, Noting, SunImages};
@@ -363,10 +365,7 @@ impl Host {
     ) -> Result<(Vec<f64>, Vec<f64>), Error> {
         let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
         let mut radiance = std::vec![0.0; unknowns * bands];
-        self.split(&mut radiance, bands, |range, out| {
-            system.start(range, out);
-            Ok(())
-        })?;
+        self.start(system, &mut radiance)?;
         let mut irradiance = std::vec![0.0; unknowns * system.shape.stride()];
         if system.shape.levels == 1 {
             report.certified.solver = self.converge(system, settings, reference, &mut radiance, report)?;
@@ -391,6 +390,15 @@ impl Host {
         Ok((irradiance, orders.pop().unwrap_or_default()))
     }
 
+    /// The radiances before any reflection.
+    fn start(&self, system: &System<'_>, radiance: &mut [f64]) -> Result<(), Error> {
+        self.split(radiance, system.shape.bands, |range, out| {
+            system.start(range, out);
+            Ok(())
+        })?;
+        Ok(())
+    }
+
     /// Sweeps until the bound on the error is a small part of the tolerance; returns the bound.
     fn converge(
         &self,
@@ -400,20 +408,65 @@ impl Host {
         radiance: &mut Vec<f64>,
         report: &mut Report,
     ) -> Result<f64, Error> {
-        let bands = system.shape.bands;
+        let Settings { tolerance, max_bounces, .. } = *settings;
         let mut probe = std::vec![0u8; system.elements.unknowns()];
         let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
         let q = parts.into_iter().fold(0.0, f64::max);
-        let mut sweeps = Sweeps::new(q, settings.tolerance, settings.max_bounces);
-        let mut next = radiance.clone();
-        while sweeps.more() {
-            let changes =
-                self.split(&mut next, bands, |range, out| Ok(system.sweep(range, radiance, out, reference)))?;
-            core::mem::swap(radiance, &mut next);
-            sweeps.took(changes.into_iter().fold(0.0, f64::max))?;
+        let mut next = std::vec![0.0; radiance.len()];
+        let kept = solver::kept(system.scene, tolerance, max_bounces);
+        let mut history = std::vec![0.0; kept * radiance.len()];
+        self.split(
+            history.head_mut(if kept > 0 { radiance.len() } else { 0 }),
+            system.shape.bands,
+            |range, out| {
+                system.deficits(range, out);
+                Ok(())
+            },
+        )?;
+        let mut inverse = None;
+        if Solver::is_closed(q, max_bounces) {
+            radiance.fill(0.0);
+            let mut unit = Solver::unit();
+            self.iterate(
+                &mut unit,
+                system,
+                [&mut *radiance, &mut next],
+                &mut history,
+                |range, from, to, relax| system.unit_sweep(range, from, to, relax),
+            )?;
+            report.sweeps += unit.done;
+            inverse = Some(unit.inverse(&next, q)?);
+            self.start(system, radiance)?;
         }
-        report.sweeps += sweeps.done;
-        Ok(sweeps.error)
+        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, kept > 0);
+        self.iterate(&mut solver, system, [radiance, &mut next], &mut history, |range, from, to, relax| {
+            system.relaxed_sweep(range, from, to, reference, relax)
+        })?;
+        solver.finish(radiance, reference, max_bounces);
+        report.sweeps += solver.done;
+        Ok(solver.error)
+    }
+
+    /// Iterates to the end: the latest solution stands in the first of both, the one before in the second.
+    fn iterate(
+        &self,
+        solver: &mut Solver,
+        system: &System<'_>,
+        [latest, next]: [&mut Vec<f64>; 2],
+        history: &mut [f64],
+        sweep: impl Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync,
+    ) -> Result<(), Error> {
+        let bands = system.shape.bands;
+        let mut history = History::new(history, latest.len());
+        while solver.more() {
+            let relaxation = solver.relaxation();
+            let changes = self.split(next, bands, |range, out| Ok(sweep(range, latest, out, relaxation)))?;
+            core::mem::swap(latest, next);
+            if solver.took(changes.into_iter().fold(0.0, f64::max)) {
+                history.note(next, latest, bands, |at| system.weight(at));
+            }
+        }
+        Ok(())
     }
 
     /// Runs `work` over ranges of rows, each with its part of `out` (`stride` values a row), in parallel.

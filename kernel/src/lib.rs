@@ -93,6 +93,7 @@ pub mod scene;
 pub mod signature;
 pub mod simd;
 pub mod sky;
+pub mod solver;
 mod sort;
 pub mod subdivide;
 pub mod sun;

@@ -4,13 +4,19 @@ use crate::bvh::Bvh;
 use crate::element::point;
 use crate::index::Index;
 use crate::lobe::Lobe;
-use crate::math::{Vec3, reflect};
+use crate::math::{Vec3, reflect, sqrt};
 use crate::ray::{Hit, Ray};
 use crate::scene::{NO_MIRROR, Scene};
 
 /// Rays start this far off their facet (scene coordinates, in which the object fills [-1, 1]): some 256 times
 /// the rounding error of a point on a facet, and a tenth of the smallest gap that is told from contact.
 pub const OFFSET: f64 = 1.0 / (1u64 << 44) as f64;
+
+/// Points whose least barycentric weight is below this may be on an edge.
+const AT_EDGE: f64 = 1e-9;
+
+/// They go this far inward: as much farther than rays start above their facet as facets that meet at a degree need.
+const STEP_IN: f64 = 256.0 * OFFSET;
 
 /// True where nothing rises above the plane of a facet's side by as much as its rays start above it.
 pub fn opens_to_sky(scene: &Scene<'_>, bvh: &Bvh<'_>, facet: usize, normal: Vec3) -> bool {
@@ -58,7 +64,23 @@ impl Surface {
         if !hit.front && scene.sides() == 1 {
             return None;
         }
-        Some(Surface::new(scene, hit.facet as usize, usize::from(!hit.front), hit.u, hit.v))
+        let mut surface = Surface::new(scene, hit.facet as usize, usize::from(!hit.front), hit.u, hit.v);
+        if hit.u.min(hit.v).min(1.0 - hit.u - hit.v) < AT_EDGE {
+            surface.step_in(scene);
+        }
+        Some(surface)
+    }
+
+    /// Moves a point at the facet's edge a little toward its middle: from the edge itself, light that goes on toward the
+    /// facet beyond would start in that one's plane, and slip out between the two.
+    #[cold]
+    fn step_in(&mut self, scene: &Scene<'_>) {
+        let [a, b, c] = scene.corners().at(self.facet);
+        let inward = (a + b + c) / 3.0 - self.point;
+        let distance = sqrt(inward.length_squared());
+        if distance > 0.0 {
+            self.point += inward * (STEP_IN / distance).min(0.5);
+        }
     }
 
     /// The ray that leaves in `direction`.

@@ -76,7 +76,8 @@ pub fn signature_cells(tolerance: f64) -> usize {
     (pow(0.25 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
 }
 
-/// When the sweeps over the linear system end: as soon as the bound on their error is a small part of the tolerance.
+/// When the sweeps over a linear system whose weights may be negative end: as soon as the bound on their error is a
+/// small part of the tolerance. [`crate::solver::Solver`] is for all others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweeps {
     /// Sweeps done.
@@ -86,26 +87,19 @@ pub struct Sweeps {
     q: f64,
     goal: f64,
     most: u32,
-    allowed: u32,
 }
 
 impl Sweeps {
-    /// Before the first sweep of a system of contraction `q` (the largest over all rows).
-    pub fn new(q: f64, tolerance: f64, max_bounces: Option<u32>) -> Sweeps {
-        Sweeps::until(q, 1e-3 * tolerance, max_bounces)
-    }
-
-    /// The same until the bound on the error is at most `goal`.
-    pub fn until(q: f64, goal: f64, max_bounces: Option<u32>) -> Sweeps {
+    /// Before the first sweep of a system of contraction `q` (the largest over all rows), until the bound on the error
+    /// is at most `goal`.
+    pub fn until(q: f64, goal: f64) -> Sweeps {
         let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
-        // a sweep adds a reflection, and so does what sees the radiances
-        let allowed = max_bounces.map_or(u32::MAX, |b| b.saturating_sub(1));
-        Sweeps { done: 0, error: f64::INFINITY, q, goal, most, allowed }
+        Sweeps { done: 0, error: f64::INFINITY, q, goal, most }
     }
 
     /// True where another sweep is wanted.
     pub fn more(&self) -> bool {
-        self.error > self.goal && self.done < self.allowed.min(self.most)
+        self.error > self.goal && self.done < self.most
     }
 
     /// Notes a sweep that changed the radiances by at most `change`.

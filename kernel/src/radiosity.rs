@@ -1,9 +1,10 @@
 //! Solves eq. (12) for the diffuse radiance of all elements, all bands together.
 //!
 //! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
-//! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep.
+//! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep. Where
+//! that would take many sweeps, [`crate::solver`] makes the most of few.
 
-use crate::coupling::{Coupling, TRACED};
+use crate::coupling::{Coupling, RowView, TRACED};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut, copy, pieces, span};
@@ -58,35 +59,85 @@ impl System<'_> {
     /// One sweep over the rows of `range`: from the radiances of all unknowns (`from`) those of the range
     /// (`to`). Returns the largest change relative to `reference`, one value per band.
     pub fn sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], reference: &[f64]) -> f64 {
+        self.relaxed_sweep(range, from, to, reference, 1.0)
+    }
+
+    /// A sweep that goes `relaxation` times the way from what `to` holds to what a plain sweep of `from` makes.
+    /// Returns the largest change that the plain sweep makes of `from`, changes within [`ROUNDING`] apart.
+    pub fn relaxed_sweep(
+        &self,
+        range: Range<usize>,
+        from: &[f64],
+        to: &mut [f64],
+        reference: &[f64],
+        relaxation: f64,
+    ) -> f64 {
         let bands = self.shape.bands.clamp(1, MAX_BANDS);
         let mut change: f64 = 0.0;
         let rows = self.coupling.rows(range.clone());
         for ((unknown, row), out) in rows.zip(pieces(to, bands)) {
             let material = self.material(unknown);
             let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
-            let mut bounced = [0.0; MAX_BANDS];
-            for record in row.targets {
-                let first = record.unknown() * bands;
-                let seen = from.part(first..first.wrapping_add(bands));
-                let terms = seen.iter().zip(row.products(record));
-                bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
-            }
+            let bounced = bounced(&row, from, bands);
             let direct = self.direct.part(self.shape.at(unknown, 0));
             for (band, (out, bounced)) in out.iter_mut().zip(bounced).enumerate() {
                 let mut irradiance = direct.at(band) + PI * bounced;
                 if let Some(sun) = &self.light.sun {
                     irradiance += self.sun.at(unknown) * sun.irradiance(band);
                 }
-                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance;
+                // what slopes add may be negative, where next to nothing arrives
+                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance.max(0.0);
                 let old = from.at(unknown * bands + band);
                 let reference = reference.at(band);
-                if reference > 0.0 {
-                    change = change.max(fabs(new - old) / reference);
+                let step = fabs(new - old);
+                if reference > 0.0 && step > ROUNDING * new {
+                    change = change.max(step / reference);
                 }
-                *out = new;
+                *out = relax(*out, new, relaxation);
             }
         }
         change
+    }
+
+    /// What the rows of `range` absorb or let out of a radiance of 1 from everywhere, for
+    /// [`crate::solver::History`].
+    pub fn deficits(&self, range: Range<usize>, out: &mut [f64]) {
+        let bands = self.shape.bands;
+        for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
+            let mut sums = [0.0; MAX_BANDS];
+            for record in row.targets {
+                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
+            }
+            let diffuse = self.scene.diffuse(self.material(unknown));
+            out.iter_mut().zip(diffuse).zip(sums).for_each(|((out, rho), sum)| *out = 1.0 - rho * sum);
+        }
+    }
+
+    /// Area over rho_d, in scene units, of the value `at` a table of one value per unknown and band: what makes fluxes of
+    /// radiances for [`crate::solver::History`]; 0 where nothing is reflected.
+    pub fn weight(&self, at: usize) -> f64 {
+        let bands = self.shape.bands.max(1);
+        let (unknown, band) = (at / bands, at % bands);
+        let facet = self.elements.facet_of(unknown).0;
+        let rho = self.scene.diffuse(self.scene.material(facet)).at(band);
+        let area = self.scene.areas().at(facet) * self.elements.share(unknown);
+        if rho > 0.0 { area / rho } else { 0.0 }
+    }
+
+    /// [`System::relaxed_sweep`] of the system whose source is 1 everywhere; returns the largest increase.
+    pub fn unit_sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], relaxation: f64) -> f64 {
+        let bands = self.shape.bands.clamp(1, MAX_BANDS);
+        let mut increase: f64 = 0.0;
+        for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
+            let diffuse = self.scene.diffuse(self.material(unknown));
+            let bounced = bounced(&row, from, bands);
+            for (band, (out, bounced)) in out.iter_mut().zip(bounced).enumerate() {
+                let new = 1.0 + diffuse.at(band) * bounced;
+                increase = increase.max(new - from.at(unknown * bands + band));
+                *out = relax(*out, new, relaxation);
+            }
+        }
+        increase
     }
 
     /// Irradiance of the rows of `range`, without the sun's direct part, as mean and gradients over each
@@ -137,6 +188,7 @@ impl System<'_> {
                     *square += l * l * record.weight;
                 }
             }
+            mean.iter_mut().for_each(|mean| *mean = mean.max(0.0));
             damp(first, second, &square, row.row.rays);
         }
         Ok(())
@@ -197,6 +249,29 @@ impl System<'_> {
     fn material(&self, unknown: usize) -> usize {
         self.scene.material(self.elements.facet_of(unknown).0)
     }
+}
+
+/// Steps of so small a share of a radiance are rounding, which no sweep undoes: a few roundings of each of a row's
+/// records, which come to sqrt(n).
+pub const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// Sum of a row's shares times the radiances that they bring.
+#[inline(always)]
+fn bounced(row: &RowView<'_>, from: &[f64], bands: usize) -> [f64; MAX_BANDS] {
+    let mut bounced = [0.0; MAX_BANDS];
+    for record in row.targets {
+        let first = record.unknown() * bands;
+        let seen = from.part(first..first.wrapping_add(bands));
+        let terms = seen.iter().zip(row.products(record));
+        bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
+    }
+    bounced
+}
+
+/// `new` itself where the relaxation is 1.
+#[inline(always)]
+fn relax(old: f64, new: f64, relaxation: f64) -> f64 {
+    if relaxation == 1.0 { new } else { relaxation * (new - old) + old }
 }
 
 /// Scales gradients down by the part of their square that noise explains (James and Stein's estimate): the

@@ -14,7 +14,7 @@ use crate::octahedron;
 
 /// Room for images, in all, where facets are few, and the least and the most of one side of a facet.
 const ROOM: usize = 1 << 16;
-const SLOTS: (usize, usize) = (4, 32);
+const SLOTS: (usize, usize) = (4, 16);
 
 /// Slots of each side of a facet.
 fn slots(sides: usize) -> usize {

@@ -86,8 +86,8 @@ impl<'m> Block<'m> {
         let escapes = self.records.part(row.escapes as usize..end as usize);
         let known = |r: &Record| (r.word() as usize) < self.words.len();
         let weighed = |r: &Record| {
-            // gradients of a share of the hemisphere: 36 times it at most
-            (0.0..=1.0 + 1e-6).contains(&r.weight)
+            // closed chains count twice at most; gradients of a share of the hemisphere: 36 times it at most
+            (0.0..=2.0 + 1e-6).contains(&r.weight)
                 && r.gradient.iter().chain(&r.checks).chain(&r.moment).all(|g| g.abs() <= 100.0)
         };
         (ABSENT..=ENCLOSED).contains(&row.state)

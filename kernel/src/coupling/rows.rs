@@ -11,7 +11,7 @@
 //! a body ([`crate::inside`]), and counts or not.
 
 use super::sink::Sink;
-use super::word::EMPTY;
+use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
@@ -381,6 +381,7 @@ impl Tracer<'_, '_> {
         // stands for the gradient until the row ends
         let mark = [bin as f32, index as f32];
         let (mut word, mut weight) = (EMPTY, 1.0);
+        let ray_start = self.sink.used();
         loop {
             tally.chain_rays += u32::from(word != EMPTY);
             let Some(hit) = met else {
@@ -406,7 +407,12 @@ impl Tracer<'_, '_> {
             let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
             let depth = self.sink.words.get(word).depth;
             if depth >= self.settings.mirrors {
-                tally.lost += weight * self.sink.words.largest(word);
+                let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
+                let rest = weight * self.sink.words.largest(word) * rho;
+                tally.lost += rest;
+                if depth as usize >= LONGEST {
+                    self.sink.close(ray_start, rest);
+                }
                 return Some(());
             }
             let next = match self.sink.spell(word, mirror.class, self.scene) {
@@ -418,7 +424,9 @@ impl Tracer<'_, '_> {
                 Err(false) => return None,
             };
             if self.sink.words.largest(next) * weight < self.settings.cutoff {
-                tally.lost += weight * self.sink.words.largest(next);
+                let rest = weight * self.sink.words.largest(next);
+                tally.lost += rest;
+                self.sink.close(ray_start, rest);
                 return Some(());
             }
             let (s, t) = lobe_point(sequence, index, depth);

@@ -28,6 +28,9 @@ fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
     Need::new().and::<Head>(1).and::<Row>(rows + 1).and::<Word>(capacity).and::<f64>(capacity * bands)
 }
 
+/// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
+const MOST_CLOSED: f64 = 0.5;
+
 /// The rows of a block while they are being written.
 #[derive(Debug)]
 pub struct Sink<'m> {
@@ -84,6 +87,25 @@ impl<'m> Sink<'m> {
         *self.records.get_mut(self.used)? = record;
         self.used += 1;
         Some(())
+    }
+
+    /// Records so far.
+    pub fn used(&self) -> usize {
+        self.used
+    }
+
+    /// Closes a chain that has become dim, whose records are those from `start` on: the rest, `rest` of the light that
+    /// it set out for, is taken to go on as it went so far, S + rest S + rest^2 S ... = S/(1 - rest). Where all facets
+    /// shine alike that is exact; no more than `rest` is added anywhere.
+    pub fn close(&mut self, start: usize, rest: f64) {
+        if !(0.0..=MOST_CLOSED).contains(&rest) {
+            return;
+        }
+        let all = 1.0 / (1.0 - rest);
+        for record in self.records.part_mut(start..self.used).iter_mut().filter(|r| !r.is_escape()) {
+            record.weight *= all;
+            record.moment = record.moment.map(|m| (f64::from(m) * all) as f32);
+        }
     }
 
     /// The word with one more letter; `Err(true)` where the chain must end, since one row alone has used up all

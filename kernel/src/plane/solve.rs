@@ -124,7 +124,7 @@ impl<'a> System<'a> {
         };
         let goal = goal.max(1e-15);
         let mut relaxed = Relaxed { contraction: self.contraction(0..self.unknowns), ..Relaxed::default() };
-        let mut sweeps = Sweeps::until(relaxed.contraction, goal, None);
+        let mut sweeps = Sweeps::until(relaxed.contraction, goal);
         let (mut from, mut to) = (&mut *radiance, &mut *scratch);
         // from no light, the first change is the brightest radiance before interreflection
         let (mut scale, mut before, mut decay) = (0.0, 0.0, f64::INFINITY);

@@ -20,19 +20,21 @@ use crate::failure::{Failure, Outcome};
 /// Reads the content of a .gltf or .glb file.
 pub fn read(path: &Path, bytes: &[u8]) -> Outcome<Mesh> {
     let fail = |e: &dyn std::fmt::Display| Failure::at(path, e);
-    let file = gltf::Gltf::from_slice(bytes).map_err(|e| fail(&e))?;
     let json = if bytes.starts_with(b"glTF") {
         gltf::Glb::from_slice(bytes).map_err(|e| fail(&e))?.json.into_owned()
     } else {
         bytes.to_vec()
     };
     let json: Value = serde_json::from_slice(&json).map_err(|e| fail(&e))?;
+    check_positions(&json).map_err(|what| fail(&what))?;
+    let file = gltf::Gltf::from_slice(bytes).map_err(|e| fail(&e))?;
     let scene = file.default_scene().or(file.scenes().next()).ok_or_else(|| fail(&"expected a scene"))?;
     let mut reader = Reader {
         path,
         buffers: buffers(path, &file)?,
         nodes: &json["nodes"],
         deepest: file.nodes().len(),
+        visits: 0,
         builder: Builder::new(path, 0),
         faces: 0,
     };
@@ -40,6 +42,23 @@ pub fn read(path: &Path, bytes: &[u8]) -> Outcome<Mesh> {
         reader.node(&node, DMat4::IDENTITY, 1)?;
     }
     reader.builder.finish()
+}
+
+/// The crate looks up the accessors of positions before it has checked that there are so many.
+fn check_positions(json: &Value) -> Result<(), String> {
+    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    let accessors = json["accessors"].as_array().map_or(0, Vec::len);
+    for (index, mesh) in list(&json["meshes"]).iter().enumerate() {
+        for primitive in list(&mesh["primitives"]) {
+            let position = primitive["attributes"]["POSITION"].as_u64().unwrap_or(0);
+            if primitive["attributes"]["POSITION"].is_u64() && position >= accessors as u64 {
+                return Err(format!(
+                    "meshes[{index}]: POSITION is accessor {position}, accessors: {accessors}"
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The content of all buffers: of the binary file itself, in the text (base64), or of files beside it.
@@ -74,6 +93,7 @@ struct Reader<'a> {
     buffers: Vec<Vec<u8>>,
     nodes: &'a Value,
     deepest: usize,
+    visits: usize,
     builder: Builder<'a>,
     faces: usize,
 }
@@ -82,6 +102,11 @@ impl Reader<'_> {
     fn node(&mut self, node: &gltf::Node, parent: DMat4, depth: usize) -> Outcome<()> {
         if depth > self.deepest {
             return Err(self.fail(&format!("nodes[{}] is its own ancestor", node.index())));
+        }
+        // without this, nodes that share children could ask for twice the work on each level
+        self.visits += 1;
+        if self.visits > self.deepest {
+            return Err(self.fail(&format!("nodes[{}] is a child of two nodes", node.index())));
         }
         let transform = local(&self.nodes[node.index()])
             .ok_or_else(|| self.fail(&format!("nodes[{}]: expected a finite transform", node.index())))?;
