@@ -30,8 +30,7 @@ def pyviewfactor(quads):
 
     count = len(quads)
     faces = np.hstack([np.full((count, 1), 4), np.arange(4 * count).reshape(count, 4)])
-    # its fronts are the sides from which the corners run clockwise
-    mesh = pyvista.PolyData(quads[:, ::-1].reshape(-1, 3), faces.ravel())
+    mesh = pyvista.PolyData(quads.reshape(-1, 3), faces.ravel())
     start = time.perf_counter()
     matrix = compute_viewfactor_matrix(mesh, skip_obstruction=True)
     return time.perf_counter() - start, matrix.sum(axis=0)
