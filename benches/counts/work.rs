@@ -15,6 +15,9 @@ use std::hint::black_box;
 pub const NAMES: [&str; 9] =
     ["tree", "closest", "occluded", "geometry", "light", "relight", "image", "signature", "bands"];
 
+/// Pixels along each side of the images.
+const PIXELS: usize = 32;
+
 /// Runs all of it once.
 pub fn run() {
     rays();
@@ -106,7 +109,7 @@ fn counted_light<'g>(values: &'g Values, host: &Host, geometry: &'g Geometry<'g>
 
 #[inline(never)]
 fn counted_image(host: &Host, lit: &Lit<'_>) {
-    black_box(image(host, lit, EYE));
+    black_box(image(host, lit, EYE, PIXELS));
 }
 
 #[inline(never)]
@@ -117,11 +120,11 @@ fn counted_signature(host: &Host, lit: &Lit<'_>) {
 /// A new sky without a sun, and its image from elsewhere.
 #[inline(never)]
 fn counted_relight(values: &Values, host: &Host, geometry: &Geometry<'_>) {
-    black_box(image(host, &values.light(host, geometry, SkyModel::Gradient, false), OTHER_EYE));
+    black_box(image(host, &values.light(host, geometry, SkyModel::Gradient, false), OTHER_EYE, PIXELS));
 }
 
 /// All of a scene in sixteen bands.
 #[inline(never)]
 fn counted_bands(case: &Case, host: &Host) {
-    black_box(case.cold(host, SkyModel::Overcast, false));
+    black_box(case.cold(host, SkyModel::Overcast, false, PIXELS));
 }

@@ -24,6 +24,11 @@ fn quick() -> bool {
     std::env::args().any(|argument| argument == "--quick")
 }
 
+/// Pixels along each side of the images.
+fn pixels() -> usize {
+    if quick() { 48 } else { 128 }
+}
+
 fn stages() {
     let mut c = Criterion::default().configure_from_args();
     scale::facets(&mut c);

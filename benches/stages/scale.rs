@@ -1,7 +1,7 @@
 //! Time against size: facets, mirrors, bands, views.
 
 use crate::scene::{Case, EYE, OTHER_EYE, Values, bowl, image};
-use crate::{group, quick};
+use crate::{group, pixels, quick};
 use blik_kernel::arena::Memory;
 use blik_kernel::bvh::Bvh;
 use blik_kernel::host::{GeometryMemory, Host};
@@ -52,12 +52,13 @@ fn stages(c: &mut Criterion, of: &str, size: usize, case: &Case) {
         b.iter_custom(|runs| reported(runs, || overcast().report().seconds.radiosity));
     });
     let lit = overcast();
-    group(c, &name("new_view")).bench_function(id.clone(), |b| b.iter(|| image(&host, &lit, OTHER_EYE)));
+    group(c, &name("new_view"))
+        .bench_function(id.clone(), |b| b.iter(|| image(&host, &lit, OTHER_EYE, pixels())));
     group(c, &name("signature")).bench_function(id.clone(), |b| {
         b.iter(|| host.signature(&lit, Vec3::new(-1.0, -0.5, -2.0)).expect("a direction").0.projected_area);
     });
     group(c, &name("relight")).bench_function(id, |b| {
-        b.iter(|| image(&host, &values.light(&host, &geometry, SkyModel::Gradient, true), EYE));
+        b.iter(|| image(&host, &values.light(&host, &geometry, SkyModel::Gradient, true), EYE, pixels()));
     });
 }
 
@@ -70,7 +71,7 @@ pub fn facets(c: &mut Criterion) {
         parts(c, &case);
         stages(c, "facets", facets, &case);
         group(c, "facets/cold").bench_function(BenchmarkId::from_parameter(facets), |b| {
-            b.iter(|| case.cold(&host, SkyModel::Overcast, true));
+            b.iter(|| case.cold(&host, SkyModel::Overcast, true, pixels()));
         });
     }
 }

@@ -81,11 +81,11 @@ impl Case {
     }
 
     /// Everything, from the arrays to the image in memory; returns one pixel.
-    pub fn cold(&self, host: &Host, sky: SkyModel<'static>, sun: bool) -> f32 {
+    pub fn cold(&self, host: &Host, sky: SkyModel<'static>, sun: bool, pixels: usize) -> f32 {
         let mut memory = GeometryMemory::default();
         let geometry = self.geometry(host, &mut memory);
         let values = Values::new(self.bands);
-        image(host, &values.light(host, &geometry, sky, sun), EYE)
+        image(host, &values.light(host, &geometry, sky, sun), EYE, pixels)
     }
 }
 
@@ -123,20 +123,20 @@ impl Values {
 pub const EYE: [f64; 3] = [2.0, 2.1, 4.0];
 pub const OTHER_EYE: [f64; 3] = [-1.0, 2.5, 4.0];
 
-/// A camera whose image is `height` high; the scenes measure about 2.
-pub fn camera(eye: [f64; 3], height: f64) -> CameraInput {
+/// A camera whose image is `height` high, of `pixels` x `pixels`; the scenes measure about 2.
+pub fn camera(eye: [f64; 3], height: f64, pixels: usize) -> CameraInput {
     CameraInput {
         projection: Projection::Orthographic { height },
         eye,
         target: [0.0, 0.0, 0.3],
         up: [0.0, 0.0, 1.0],
-        columns: 128,
-        rows: 128,
+        columns: pixels,
+        rows: pixels,
         sampling: Sampling::Area,
     }
 }
 
 /// Makes an image in which the object is large; one pixel of it.
-pub fn image(host: &Host, lit: &Lit<'_>, eye: [f64; 3]) -> f32 {
-    host.image(lit, &camera(eye, 2.6), false).expect("a sound camera").pixels[0]
+pub fn image(host: &Host, lit: &Lit<'_>, eye: [f64; 3], pixels: usize) -> f32 {
+    host.image(lit, &camera(eye, 2.6, pixels), false).expect("a sound camera").pixels[0]
 }

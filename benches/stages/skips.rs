@@ -1,7 +1,7 @@
 //! What a scene does not contain costs nothing: each pair is the same work with something absent, then present.
 
 use crate::scene::{Case, EYE, Mesh, Values, bowl, camera, image, sphere};
-use crate::{group, quick};
+use crate::{group, pixels, quick};
 use blik_kernel::host::{GeometryMemory, Host, Settings};
 use blik_kernel::sky::SkyModel;
 use criterion::Criterion;
@@ -67,7 +67,7 @@ fn view(c: &mut Criterion, host: &Host) {
         let (absent, present) = (absent.geometry(host, &mut first), present.geometry(host, &mut second));
         let lit = |geometry| values.light(host, geometry, SkyModel::Overcast, true);
         let (absent, present) = (lit(&absent), lit(&present));
-        pair(c, name, || image(host, &absent, EYE), || image(host, &present, EYE));
+        pair(c, name, || image(host, &absent, EYE, pixels()), || image(host, &present, EYE, pixels()));
     };
     image_of(c, "mirrors_in_view", Case::new(mesh(), 0.3, 0.0), Case::new(mesh(), 0.3, 0.1));
     // after two mirrors of 0.01 nothing is left to follow
@@ -76,6 +76,7 @@ fn view(c: &mut Criterion, host: &Host) {
     let mut memory = GeometryMemory::default();
     let (geometry, values) = (case.geometry(host, &mut memory), Values::new(1));
     let lit = values.light(host, &geometry, SkyModel::Overcast, true);
-    let of_height = |height| host.image(&lit, &camera(EYE, height), false).expect("a sound camera").pixels[0];
+    let of_height =
+        |height| host.image(&lit, &camera(EYE, height, pixels()), false).expect("a sound camera").pixels[0];
     pair(c, "pixels_of_the_object", || of_height(26.0), || of_height(2.6));
 }
