@@ -2,6 +2,7 @@
 
 import csv
 import math
+import os
 import statistics
 import subprocess
 import time
@@ -65,6 +66,11 @@ class Scene:
         return corrected if corrected >= 0.5 * self.noise else None
 
 
+def processor():
+    """Computing time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
+
+
 class Mitsuba:
     """Path tracing of the object's pixels: the sky is met by the surfaces' own sampling."""
 
@@ -95,16 +101,16 @@ class Mitsuba:
         self.seed = 0
 
     def image(self, samples):
-        """Seconds and the object's pixels, from the scene in its memory. Samples: a square number."""
+        """Seconds, the object's pixels and processor seconds; the scene is in memory. Samples: a square number."""
         pixels = len(self.scene.origins)
         # so many rays at once fit into the memory of a small machine
         side = math.isqrt(min(samples, (1 << 23) // pixels))
-        start = time.perf_counter()
+        start, before = time.perf_counter(), processor()
         total, passes = 0.0, round(samples / side**2)
         for _ in range(passes):
             self.seed += 1
             total = total + np.array(self.paths(side**2, self.seed))
-        return time.perf_counter() - start, total / passes
+        return time.perf_counter() - start, total / passes, processor() - before
 
     def paths(self, samples, seed):
         dr, mi = self.dr, self.mi
@@ -188,95 +194,103 @@ class Radiance:
         return {"RAYPATH": f".:{self.root}/lib", "PATH": "/usr/bin:/bin"}
 
     def image(self, divisions):
-        """Seconds of the program, with its octree made, and the object's pixels."""
+        """Seconds and processor seconds of the program, with its octree made, and the object's pixels."""
         settings = f"-h -fdf -ab 5 -ad {divisions} -as {divisions // 4} -aa .1 -ar 512 -lw 1e-6 -lr 8 -n 2".split()
-        start = time.perf_counter()
+        start, before = time.perf_counter(), processor()
         with (self.work / "scene.rays").open("rb") as rays:
             command = [self.root / "bin/rtrace", *settings, self.work / "scene.oct"]
             run = subprocess.run(command, stdin=rays, env=self.env(), capture_output=True, check=True)
-        seconds = time.perf_counter() - start
-        return seconds, np.frombuffer(run.stdout, np.float32).reshape(-1, 3)[:, 0]
+        seconds = time.perf_counter() - start, processor() - before
+        return *seconds, np.frombuffer(run.stdout, np.float32).reshape(-1, 3)[:, 0]
 
 
 def blik_runs(blik, scene, options):
-    """(tolerance, seconds, error, estimate) from coarse to fine; the error is the true one, else the estimate."""
+    """(tolerance, seconds, error, whether it is the true one, processor seconds) from coarse to fine; where the
+    reference does not show the error it is the estimate."""
     out, runs = options.work / "image.f32", []
     blik("open", scene.path)
     for tolerance in TOLERANCES:
         answer = blik("cold", tolerance, out)
         pixels = np.fromfile(out, np.float32).reshape(scene.hit.shape)[scene.hit]
         true = scene.eps(pixels)
-        runs.append((tolerance, answer["seconds"], true or answer["estimate"], true is not None))
-        if answer["seconds"] > LONGEST:
+        error = true or answer["estimate"]
+        runs.append((tolerance, answer["seconds"], error, true is not None, answer["processor"]))
+        if answer["processor"] > LONGEST:
             break
     return runs
 
 
 def first(runs, goal):
     """The quickest run that reaches the goal."""
-    return min((r for r in runs if r[2] <= goal), key=lambda r: r[1], default=None)
+    return min((r for r in runs if r[2] <= goal), key=lambda r: r[4], default=None)
 
 
 def in_turn(blik, mitsuba, tolerance, samples, work, runs):
-    """Median seconds of both and the median of the ratios, a run of each in turn."""
+    """Median (seconds, processor seconds) of both, a run of each in turn."""
     own, theirs = [], []
     mitsuba.image(samples)  # compiles
     for _ in range(runs):
-        own.append(blik("cold", tolerance, work)["seconds"])
-        theirs.append(mitsuba.image(samples)[0])
-    return statistics.median(own), statistics.median(theirs)
+        answer, (seconds, _, processor) = blik("cold", tolerance, work), mitsuba.image(samples)
+        own.append((answer["seconds"], answer["processor"]))
+        theirs.append((seconds, processor))
+    medians = lambda rows: [statistics.median(column) for column in zip(*rows)]
+    return medians(own), medians(theirs)
 
 
 def compare(blik, found, options):
     """Tables for both programs."""
-    lines = [
-        "| image, 2 threads | error | Blik: tolerance | error | cold, s | Mitsuba: samples | s | ratio |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    radiance = ["| image, 2 threads | Radiance: -ad | error | s | Blik: tolerance | error | cold, s | ratio |", "|" + "---|" * 8]
+    head = "| image, 2 threads | error | Blik: tolerance | error | s | of the processor | {} | s | of the processor | ratio | ratio |"
+    tables = {"Mitsuba: samples": [], "Radiance: -ad": []}
     for name in filter(found.get, SCENES):
         scene = Scene(found[name], name)
         runs = blik_runs(blik, scene, options)
-        mitsuba = Mitsuba(scene)
-        lines += mitsuba_rows(blik, scene, mitsuba, runs, options)
-        radiance += radiance_rows(scene, runs, options)
-    note = "(Errors in brackets: below what the reference shows; Blik's is its own estimate, Mitsuba's goes with samples^-1/2.)"
-    return "\n".join([*lines, "", note, "", *radiance]) + "\n"
+        tables["Mitsuba: samples"] += mitsuba_rows(blik, scene, Mitsuba(scene), runs, options)
+        tables["Radiance: -ad"] += radiance_rows(scene, runs, options, options.work)
+    note = (
+        "Ratios: of seconds, of processor seconds. Errors in brackets: below what the reference shows; Blik's is its own "
+        "estimate, Mitsuba's goes with samples^-1/2."
+    )
+    lines = []
+    for program, rows in tables.items():
+        lines += [head.format(program), "|" + "---|" * 11, *rows, ""]
+    return "\n".join([*lines, note]) + "\n"
+
+
+def row(name, goal, blik, own, peer, theirs):
+    """A line of a table; `blik` is a run or None, `own` and `theirs` are seconds and processor seconds."""
+    head = f"| {name} | {goal:.2e} |"
+    if blik is None:
+        return f"{head} not reached | | | | {peer} | {theirs[0]:.3f} | {theirs[1]:.3f} | | |"
+    error = f"{blik[2]:.1e}" if blik[3] else f"({blik[2]:.1e})"
+    ratios = [t / o for t, o in zip(theirs, own)]
+    return (
+        f"{head} {blik[0]:.0e} | {error} | {own[0]:.3f} | {own[1]:.3f} | {peer} | {theirs[0]:.3f} | {theirs[1]:.3f} | "
+        f"{ratios[0]:.1f} | {ratios[1]:.1f} |"
+    )
 
 
 def mitsuba_rows(blik, scene, mitsuba, runs, options):
     mitsuba.image(64)
-    probe = 64
     # the error of one sample a pixel, from the mean of several images' squares
-    errors = [scene.eps(mitsuba.image(probe)[1]) for _ in range(3)]
-    single = math.sqrt(statistics.mean((e or 0.0) ** 2 for e in errors) * probe)
+    errors = [scene.eps(mitsuba.image(64)[1]) for _ in range(3)]
+    single = math.sqrt(statistics.mean((e or 0.0) ** 2 for e in errors) * 64)
     lines = []
     for goal in GOALS[scene.name]:
         samples = math.ceil(max(2.0, single / goal)) ** 2
         run = first(runs, goal)
-        if run is None:
-            finest = runs[-1]
-            lines.append(f"| {scene.name} | {goal:.2e} | not reached: {finest[0]:.0e} | {finest[2]:.1e} | {finest[1]:.2f} | {samples} | | |")
-            continue
-        tolerance, _, error, shown = run
         # more samples than that are so many images of this many
-        few = min(samples, 1024)
-        own, theirs = in_turn(blik, mitsuba, tolerance, few, options.work / "image.f32", 3 if options.quick else 7)
-        theirs *= samples / few
-        mark = f"{error:.1e}" if shown else f"({error:.1e})"
-        lines.append(
-            f"| {scene.name} | {goal:.2e} | {tolerance:.0e} | {mark} | {own:.3f} | {samples} | {theirs:.3f} | {theirs / own:.1f} |"
-        )
+        few, count = min(samples, 1024), 3 if options.quick else 5
+        own, theirs = in_turn(blik, mitsuba, (run or runs[0])[0], few, options.work / "image.f32", count)
+        lines.append(row(scene.name, goal, run, own, samples, [t * samples / few for t in theirs]))
     return lines
 
 
-def radiance_rows(scene, runs, options):
-    program = Radiance(scene, options.work)
+def radiance_rows(scene, runs, options, work):
+    program = Radiance(scene, work)
     lines = []
-    for divisions in [256] if options.quick else [256, 1024, 4096]:
-        seconds, values = program.image(divisions)
-        error = scene.eps(values)
-        run = first(runs, error) if error else None
-        blik = f"{run[0]:.0e} | {run[2]:.1e} | {run[1]:.3f} | {seconds / run[1]:.1f}" if run else "not reached | | |"
-        lines.append(f"| {scene.name} | {divisions} | {error or 0:.1e} | {seconds:.2f} | {blik} |")
+    for divisions in [128] if options.quick else [128, 512]:
+        seconds, processor, values = program.image(divisions)
+        error = scene.eps(values) or 0.5 * scene.noise
+        run = first(runs, error)
+        lines.append(row(scene.name, error, run, run and (run[1], run[4]), divisions, (seconds, processor)))
     return lines

@@ -3,6 +3,8 @@
 
 #[path = "../../tests/support/kernel.rs"]
 mod kernel;
+#[path = "../processor.rs"]
+mod processor;
 mod rays;
 #[path = "../../tests/support/mod.rs"]
 mod support;
@@ -13,6 +15,7 @@ use blik_kernel::host::{Geometry, GeometryMemory, Host, Image, Lit, Settings};
 use blik_kernel::math::Vec3;
 use blik_kernel::sky::{SkyInput, SkyModel};
 use blik_kernel::sun::SunInput;
+use processor::processor_seconds;
 use serde_json::{Value, json};
 use std::error::Error;
 use std::path::Path;
@@ -109,18 +112,19 @@ fn median(runs: usize, mut work: impl FnMut() -> Result<(), Box<dyn Error>>) -> 
 
 /// From the arrays to the image, with everything; writes the pixels (f32, little-endian).
 fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
+    let before = processor_seconds();
     let (seconds, image) = timed(|| -> Result<Image, Box<dyn Error>> {
         let mut memory = GeometryMemory::default();
         let geometry = scene.geometry(host, &settings(tolerance, !scene.uniform()), &mut memory)?;
         let lit = scene.light(host, &geometry)?;
         Ok(host.image(&lit, &scene.camera, false)?)
     });
-    let image = image?;
+    let (image, processor) = (image?, processor_seconds() - before);
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_le_bytes()).collect();
     std::fs::write(out, bytes)?;
     let (report, b) = (&image.report, image.report.bytes);
     Ok(json!({
-        "seconds": seconds, "estimate": report.error_estimate,
+        "seconds": seconds, "processor": processor, "estimate": report.error_estimate,
         "bytes": b.scene + b.bvh + b.coupling + b.light + b.image,
     }))
 }

@@ -10,12 +10,15 @@
 mod chart;
 #[path = "../../tests/support/kernel.rs"]
 mod kernel;
+#[path = "../processor.rs"]
+mod processor;
 #[path = "../../tests/support/mod.rs"]
 mod support;
 
 use blik_kernel::camera::CameraInput;
 use blik_kernel::host::{GeometryMemory, Host, Report, Settings};
 use chart::{Figure, Series};
+use processor::processor_seconds;
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::PathBuf;
@@ -75,6 +78,8 @@ struct Row {
     corrected: f64,
     /// Seconds from the arrays to the image, and for an image of the solved scene from elsewhere.
     cold: f64,
+    /// Processor seconds of the former, all threads together.
+    processor: f64,
     view: f64,
     rays: u64,
     bytes: usize,
@@ -93,12 +98,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         "reference_standard_error",
         "eps_c",
         "seconds_cold",
+        "processor_seconds_cold",
         "seconds_new_view",
         "rays",
         "bytes",
     ])?;
-    println!("| scene | asked | estimate | true eps_c | cold, s | new view, s | Mray | MiB |");
-    println!("|---|---|---|---|---|---|---|---|");
+    println!(
+        "| scene | asked | estimate | true eps_c | cold, s | of the processor | new view, s | Mray | MiB |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
     let mut rows: Vec<Row> = Vec::new();
     for reference in references::all().iter().filter(|r| r.id.contains(&options.scenes)) {
         for &tolerance in &options.tolerances {
@@ -127,11 +135,12 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
     };
     let camera = kernel::camera(&camera);
     let soup = kernel::Soup::new(&scene);
+    let mut processor = vec![];
     let (sky_table, mut cold, mut view) =
         (scene.sky.as_ref().map_or(Vec::new(), kernel::table), vec![], vec![]);
     let mut outcome = None;
     while cold.len() < RUNS && cold.last().is_none_or(|&s| s < 0.1 * limit) {
-        let start = Instant::now();
+        let (before, start) = (processor_seconds(), Instant::now());
         let mut memory = GeometryMemory::default();
         let geometry = soup.with_input(|input| host.geometry(&mut memory, input, &settings))?;
         let sky = scene.sky.as_ref().map(|sky| kernel::sky_input(sky, &sky_table));
@@ -139,6 +148,7 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
         let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
         let image = host.image(&lit, &camera, false)?;
         cold.push(start.elapsed().as_secs_f64());
+        processor.push(processor_seconds() - before);
         let start = Instant::now();
         std::hint::black_box(host.image(&lit, &turned(&camera), false)?);
         view.push(start.elapsed().as_secs_f64());
@@ -156,6 +166,7 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
         noise,
         corrected: metric::corrected(eps, noise),
         cold: median(cold),
+        processor: median(processor),
         view: median(view),
         rays: rays.visibility + rays.sun + rays.chain + rays.primary,
         bytes: bytes.scene + bytes.bvh + bytes.coupling + bytes.light + bytes.image,
@@ -183,15 +194,24 @@ impl Row {
 
     fn print(&self) {
         let (rays, bytes) = (self.rays as f64 * 1e-6, self.bytes as f64 / 1048576.0);
-        let Row { scene, asked, estimate, cold, view, .. } = self;
+        let Row { scene, asked, estimate, cold, processor, view, .. } = self;
         let truth = self.truth();
         println!(
-            "| {scene} | {asked:.0e} | {estimate:.1e} | {truth} | {cold:.3} | {view:.4} | {rays:.2} | {bytes:.1} |"
+            "| {scene} | {asked:.0e} | {estimate:.1e} | {truth} | {cold:.3} | {processor:.3} | {view:.4} | {rays:.2} | {bytes:.1} |"
         );
     }
 
     fn record(&self) -> Vec<String> {
-        let small = [self.asked, self.estimate, self.eps, self.noise, self.corrected, self.cold, self.view];
+        let small = [
+            self.asked,
+            self.estimate,
+            self.eps,
+            self.noise,
+            self.corrected,
+            self.cold,
+            self.processor,
+            self.view,
+        ];
         let mut record = vec![self.scene.clone()];
         record.extend(small.iter().map(|x| format!("{x:.4e}")));
         record.extend([self.rays.to_string(), self.bytes.to_string()]);
@@ -203,7 +223,7 @@ impl Row {
 fn draw(rows: &[Row], options: &Options) -> Result<(), Box<dyn Error>> {
     let mut meshes: BTreeMap<&str, Vec<Series>> = BTreeMap::new();
     for rows in rows.chunk_by(|a, b| a.scene == b.scene) {
-        let (mesh, rest) = rows[0].scene.split_once("_d").unwrap_or((&rows[0].scene, ""));
+        let (mesh, rest) = rows[0].scene.split_once("_d").unwrap_or((&rows[0].scene, &rows[0].scene));
         let error = |row: &Row| row.corrected.max(0.5 * row.noise).max(1e-6);
         let name = rest.replace("_s", "/").replace('_', " ");
         let series = |kind: &str, seconds: fn(&Row) -> f64| Series {
