@@ -26,7 +26,7 @@ fn quick() -> bool {
 
 /// Pixels along each side of the images.
 fn pixels() -> usize {
-    if quick() { 48 } else { 128 }
+    if quick() { 32 } else { 128 }
 }
 
 fn stages() {

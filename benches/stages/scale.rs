@@ -17,7 +17,7 @@ use std::time::Duration;
 fn sizes() -> &'static [usize] {
     let all = &[7, 22, 71, 224];
     match (quick(), std::env::var_os("BLIK_BENCH_LARGE").is_some()) {
-        (true, _) => &all[..2],
+        (true, _) => &all[..1],
         (false, false) => &all[..3],
         (false, true) => all,
     }
@@ -25,7 +25,7 @@ fn sizes() -> &'static [usize] {
 
 /// Quads along a side where it is not the size that is measured.
 fn quads() -> usize {
-    if quick() { 8 } else { 16 }
+    if quick() { 5 } else { 16 }
 }
 
 /// Adds up the seconds that `run` reports, over so many runs.
@@ -120,13 +120,13 @@ pub fn bands(c: &mut Criterion) {
     }
 }
 
-/// What a distant observer measures from 1,000 directions around the object (100 in a first look).
+/// What a distant observer measures from 1,000 directions around the object (10 in a first look).
 pub fn light_curve(c: &mut Criterion) {
     let (host, case) = (Host::new(0).expect("threads"), Case::new(bowl(22), 0.3, 0.1));
     let mut memory = GeometryMemory::default();
     let (geometry, values) = (case.geometry(&host, &mut memory), Values::new(1));
     let lit = values.light(&host, &geometry, SkyModel::Overcast, true);
-    let views = if quick() { 100 } else { 1000 };
+    let views = if quick() { 10 } else { 1000 };
     let direction = |i: u32| {
         let angle = std::f64::consts::TAU * f64::from(i) / f64::from(views);
         Vec3::new(angle.cos(), angle.sin(), -0.7)

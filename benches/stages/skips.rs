@@ -23,7 +23,7 @@ pub fn pairs(c: &mut Criterion) {
 }
 
 fn mesh() -> Mesh {
-    bowl(if quick() { 8 } else { 16 })
+    bowl(if quick() { 5 } else { 16 })
 }
 
 fn geometry(host: &Host, case: &Case) -> usize {
