@@ -3,7 +3,7 @@
 
 #[path = "../../tests/support/kernel.rs"]
 mod kernel;
-#[path = "../processor.rs"]
+#[path = "../time_error/processor.rs"]
 mod processor;
 mod rays;
 #[path = "../../tests/support/mod.rs"]

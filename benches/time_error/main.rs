@@ -10,7 +10,6 @@
 mod chart;
 #[path = "../../tests/support/kernel.rs"]
 mod kernel;
-#[path = "../processor.rs"]
 mod processor;
 #[path = "../../tests/support/mod.rs"]
 mod support;
