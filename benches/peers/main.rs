@@ -138,7 +138,8 @@ fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     let across = (t - e).cross(scene.camera.up.into()).normalize() * 0.1 * (t - e).length();
     let turned = CameraInput { eye: (e + across).to_array(), ..scene.camera };
     let large = CameraInput { columns: 512, rows: 512, ..turned };
-    let view = |camera: &CameraInput| median(runs, || Ok(drop(host.image(&lit, camera, false)?)));
+    let view =
+        |camera: &CameraInput| median(runs, || host.image(&lit, camera, false).map(drop).map_err(Into::into));
     let curve = || -> Result<(), Box<dyn Error>> {
         for i in 0..1000 {
             let angle = std::f64::consts::TAU * f64::from(i) / 1000.0;
@@ -150,7 +151,9 @@ fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     let geometry = scene.geometry(host, &all, &mut directed)?;
     let sky = |model| SkyInput { model, radiance: &[1.0], ground: &[0.1], up: [0.0, 0.0, 1.0] };
     let sun = SunInput { direction: [0.5, 0.8, 0.9], irradiance: &[2.0], half_angle_deg: 0.2665 };
-    let relit = |model, sun| median(runs, || Ok(drop(host.light(&geometry, Some(&sky(model)), sun)?)));
+    let relit = |model, sun| {
+        median(runs, || host.light(&geometry, Some(&sky(model)), sun).map(drop).map_err(Into::into))
+    };
     Ok(json!({
         "new_view": view(&turned)?, "new_view_512": view(&large)?, "light_curve": median(1, curve)?,
         "new_sky": relit(SkyModel::Overcast, None)?, "new_sun": relit(SkyModel::Overcast, Some(&sun))?,
