@@ -197,9 +197,17 @@ fn skipped(lit: &Lit<'_>, name: &str) -> u64 {
 #[test]
 fn no_mirrors_no_chains() {
     let case = Case::new(scenes::corner(2), &vec![Material::new(0.5, 0.0); 3]).sky(SkyOf::uniform(1));
-    let rays = case.run(2, &within(1e-2), &views()[0]).image.report.rays;
+    let report = case.run(2, &within(1e-2), &views()[0]).image.report;
+    let rays = report.rays;
     assert_eq!((rays.chain, rays.sun), (0, 0), "{rays:?}");
     assert!(rays.primary >= 24 * 24 && rays.visibility > 0);
+    let lines = |name: &str| report.skipped.iter().filter(|s| s.0 == name).map(|s| s.1).sum::<u64>();
+    assert_eq!(lines("facets that end every chain"), 24);
+    let rows = report.elements as u64;
+    for light in ["rows without a sun", "rows of a uniform sky, by closure"] {
+        assert!(lines(light) >= rows, "{:?}", report.skipped);
+    }
+    assert!(lines("pixels beside the object") > 0, "{:?}", report.skipped);
 }
 
 #[test]

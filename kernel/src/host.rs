@@ -205,6 +205,7 @@ impl Host {
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
         report.count_rows(&coupling);
+        report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
         Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), report })
@@ -275,6 +276,7 @@ impl Host {
             report.rays.sun += rays.iter().sum::<u64>();
             report.rays.sun += self.beams(geometry, sun, shape, &mut direct, &mut suns)?;
         }
+        report.count_light(&light, unknowns);
         report.bytes.light = 8 * (direct.len() + lit_share.len() + suns.slots.len() + suns.thrown.len());
         report.seconds.light = clock.lap();
         let (coupling, light) = (&coupling, &light);
@@ -506,7 +508,7 @@ impl Host {
         report.rays.primary = tally.primary + cells;
         report.rays.chain += tally.chain + rays - cells;
         report.seconds.image = clock.lap();
-        report.finish(&tally);
+        report.finish(&tally, columns * rows);
         Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
     }
 

@@ -113,11 +113,7 @@ pub fn solve_soup<R>(
 ) -> R {
     let table = light.sky.as_ref().map_or(Vec::new(), table);
     let sky = light.sky.as_ref().map(|sky| sky_input(sky, &table));
-    let sun = light.sun.as_ref().map(|sun| SunInput {
-        direction: sun.direction.to_array(),
-        irradiance: &sun.irradiance,
-        half_angle_deg: sun.half_angle.to_degrees(),
-    });
+    let sun = light.sun.as_ref().map(sun_input);
     soup_geometry(soup, settings, |host, geometry| {
         with(host, &host.light(geometry, sky.as_ref(), sun.as_ref()).unwrap())
     })
@@ -148,6 +144,15 @@ pub fn sky_input<'a>(sky: &'a twin::Sky, table: &'a [f32]) -> SkyInput<'a> {
         }),
     };
     SkyInput { model, radiance: &sky.radiance, ground: &sky.ground, up: sky.up.to_array() }
+}
+
+/// The sun as the kernel takes it.
+pub fn sun_input(sun: &twin::Sun) -> SunInput<'_> {
+    SunInput {
+        direction: sun.direction.to_array(),
+        irradiance: &sun.irradiance,
+        half_angle_deg: sun.half_angle.to_degrees(),
+    }
 }
 
 /// The camera of a scene file: one ray through each pixel's centre.

@@ -117,7 +117,8 @@ impl Figure {
         self.draw(&path.with_extension("svg"))
     }
 
-    fn draw(&self, path: &Path) -> Result<(), Box<dyn Error>> {
+    /// Writes the chart alone.
+    pub fn draw(&self, path: &Path) -> Result<(), Box<dyn Error>> {
         let shown = |p: &&(f64, f64)| !(self.log.1 && p.1 < FLOOR);
         let points = || self.series.iter().flat_map(|s| &s.points).filter(shown);
         let x = Axis::new(self.log.0, points().map(|p| p.0));

@@ -2,7 +2,10 @@
 
 use crate::coupling::{ABSENT, Coupling, OPEN};
 use crate::image::Tally;
+use crate::light::Light;
 use crate::policy;
+use crate::scene::Scene;
+use crate::sky::Sky;
 use std::vec::Vec;
 
 /// The keys of the program's `report.json`; seconds of reading and writing are the program's own.
@@ -140,15 +143,36 @@ impl Report {
             open += u64::from(row.row.state == OPEN);
         }
         self.pairs.tested = self.pairs.sampled;
-        for (name, count) in [("black or degenerate rows", skipped), ("rows open to the sky alone", open)] {
-            if count > 0 {
-                self.skipped.push((name, count));
-            }
+        self.skip("black or degenerate rows", skipped);
+        self.skip("rows open to the sky alone", open);
+    }
+
+    /// Notes work that was not needed, and how often; nothing where it was needed everywhere.
+    fn skip(&mut self, what: &'static str, count: u64) {
+        if count > 0 {
+            self.skipped.push((what, count));
         }
     }
 
-    /// Puts the image's part in and draws the conclusions.
-    pub(super) fn finish(&mut self, tally: &Tally) {
+    /// What geometry and materials spare the coupling of `rows` rows.
+    pub(super) fn count_scene(&mut self, scene: &Scene<'_>, directional: bool, rows: usize) {
+        let mirrors = |&facet: &usize| scene.specular(scene.material(facet)).iter().any(|&rho| rho > 0.0);
+        let others = scene.facets() - (0..scene.facets()).filter(mirrors).count();
+        self.skip("facets that end every chain", others as u64);
+        self.skip("rows without directions of the sky", if directional { 0 } else { rows as u64 });
+    }
+
+    /// What a light of `rows` rows lacks.
+    pub(super) fn count_light(&mut self, light: &Light<'_>, rows: usize) {
+        let uniform = light.sky.as_ref().is_some_and(Sky::is_uniform);
+        self.skip("rows of a uniform sky, by closure", if uniform { rows as u64 } else { 0 });
+        self.skip("rows without a sun", if light.sun.is_none() { rows as u64 } else { 0 });
+    }
+
+    /// Puts the part of an image of so many pixels in and draws the conclusions.
+    pub(super) fn finish(&mut self, tally: &Tally, pixels: usize) {
+        self.skip("pixels beside the object", (pixels as u64).saturating_sub(tally.object_pixels));
+        self.skip("pixels of which the centre is enough", (pixels as u64).saturating_sub(tally.refined));
         self.certified.chain_tail = tally.tail;
         self.certified.excludes = std::vec!["visibility", "light", "interpolation", "sampling"];
         let (error, limit) = policy::estimate(tally, self.certified.solver);
