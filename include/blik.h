@@ -11,6 +11,10 @@
  *       -> blik_solution           sky and sun, solved                 once per light
  *       -> blik_image, blik_signatures, blik_radiance, blik_facets     once per view
  *
+ * and the same in two dimensions, the plane model (circles and polylines), whose functions start with blik_plane:
+ *
+ *     blik_plane_bodies -> blik_plane_scene -> blik_plane_coupling -> blik_plane_solution -> blik_plane_image
+ *
  * Memory.  The library never takes memory by itself but in the functions called create (and where an image's scratch
  *   memory is null), which the variant without the standard library (BLIK_NO_STD) does not have. Everything else works
  *   in memory of the caller: ask for its size, hand it over to init, and keep it as long as the handle is in use.
@@ -64,6 +68,87 @@
  * Boundary, in bytes, on which a baked block starts.
  */
 #define BLIK_BLOCK_ALIGNMENT 64
+
+/**
+ * blik_plane_material: the rays that the tolerance needs.
+ */
+#define BLIK_PLANE_RAYS_AUTO 0
+
+/**
+ * blik_plane_material: three rays as eq. (18) has them; those below the surface are lost.
+ */
+#define BLIK_PLANE_RAYS_PAPER 1
+
+/**
+ * blik_plane_material: three rays, of which those above the surface share the lobe's albedo.
+ */
+#define BLIK_PLANE_RAYS_RENORMALISED 2
+
+/**
+ * blik_plane_material: Gauss nodes in the visible lobe's energy.
+ */
+#define BLIK_PLANE_RAYS_GAUSS 3
+
+/**
+ * blik_plane_material: midpoints of equal shares of the visible lobe's energy.
+ */
+#define BLIK_PLANE_RAYS_EQUAL 4
+
+/**
+ * blik_plane_material: Gauss nodes in each part of the lobe between silhouettes.
+ */
+#define BLIK_PLANE_RAYS_SPLIT 5
+
+/**
+ * blik_plane_body: a circle, seen from outside.
+ */
+#define BLIK_PLANE_CIRCLE 0
+
+/**
+ * blik_plane_body: straight segments from point to point.
+ */
+#define BLIK_PLANE_POLYLINE 1
+
+/**
+ * blik_plane_body: straight segments, the last of which joins the first point.
+ */
+#define BLIK_PLANE_POLYGON 2
+
+/**
+ * A choice of blik_plane_settings that follows from the tolerance.
+ */
+#define BLIK_PLANE_AUTO 0
+
+/**
+ * `basis` of blik_plane_settings: radiance is constant on each element, as in the paper.
+ */
+#define BLIK_PLANE_CONSTANT 1
+
+/**
+ * `basis` of blik_plane_settings: linear between the elements' centres.
+ */
+#define BLIK_PLANE_LINEAR 2
+
+/**
+ * `basis` of blik_plane_settings: polynomials through `order` Gauss points of each element.
+ */
+#define BLIK_PLANE_PANELS 3
+
+/**
+ * `method` of blik_plane_settings: exact form factors of elements times the radiance at their centres, with
+ * `points` mirror chains for each, as in the paper.
+ */
+#define BLIK_PLANE_FACETS 1
+
+/**
+ * `method` of blik_plane_settings: the half circle is split where chains change, each part with `points` nodes.
+ */
+#define BLIK_PLANE_SPLIT 2
+
+/**
+ * Most jumps of a plane sky.
+ */
+#define BLIK_PLANE_MAX_JUMPS 12
 
 /**
  * `limited_by` of blik_report: the estimate is 0.
@@ -136,12 +221,12 @@
 #define BLIK_ERROR_TOO_MANY 7
 
 /**
- * The mesh has no facets.
+ * The mesh has no facets, or the plane scene no bodies.
  */
 #define BLIK_ERROR_NO_FACETS 8
 
 /**
- * The mesh has no materials.
+ * The mesh or the plane scene has no materials.
  */
 #define BLIK_ERROR_NO_MATERIALS 9
 
@@ -176,7 +261,7 @@
 #define BLIK_ERROR_NORMAL_INDEX 15
 
 /**
- * Facet `index` has a material (`value`) that there is not.
+ * Facet or plane body `index` has a material (`value`) that there is not.
  */
 #define BLIK_ERROR_MATERIAL_INDEX 16
 
@@ -239,6 +324,11 @@
  * A fault of the library; please report it.
  */
 #define BLIK_ERROR_INTERNAL 28
+
+/**
+ * Body `index` of a plane scene is no circle or polyline; `field` tells why.
+ */
+#define BLIK_ERROR_BODY 29
 
 /**
  * No field.
@@ -371,6 +461,41 @@
 #define BLIK_FIELD_ROWS 25
 
 /**
+ * Reflections that count.
+ */
+#define BLIK_FIELD_MAX_BOUNCES 26
+
+/**
+ * Gauss points of an element of the plane model.
+ */
+#define BLIK_FIELD_PLANE_ORDER 27
+
+/**
+ * Nodes or chains of a method of the plane model.
+ */
+#define BLIK_FIELD_PLANE_POINTS 28
+
+/**
+ * Elements of a body of the plane model.
+ */
+#define BLIK_FIELD_BODY_ELEMENTS 29
+
+/**
+ * Radius of a body of the plane model.
+ */
+#define BLIK_FIELD_BODY_RADIUS 30
+
+/**
+ * Coordinates of a body of the plane model: not finite, beyond 1e100, too few points, or two that coincide.
+ */
+#define BLIK_FIELD_BODY_POINTS 31
+
+/**
+ * What a tally says of errors.
+ */
+#define BLIK_FIELD_TALLY 32
+
+/**
  * Numbers of blik_array: 32-bit floating point.
  */
 #define BLIK_F32 1
@@ -456,6 +581,21 @@
 typedef struct blik_coupling blik_coupling;
 
 /**
+ * The coupling of a plane scene in memory. Read-only once made: any number of threads may use it at once.
+ */
+typedef struct blik_plane_coupling blik_plane_coupling;
+
+/**
+ * A plane scene in memory. Read-only once made: any number of threads may use it at once.
+ */
+typedef struct blik_plane_scene blik_plane_scene;
+
+/**
+ * A solved plane scene in memory. Any number of threads may use it at once.
+ */
+typedef struct blik_plane_solution blik_plane_solution;
+
+/**
  * A scene in memory. Read-only once made: any number of threads may use it at once.
  */
 typedef struct blik_scene blik_scene;
@@ -525,6 +665,17 @@ typedef struct blik_settings {
      * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
      */
     int32_t directional;
+    /**
+     * Not 0: where the caller's memory is too small for the rows, their rays are halved until it is not; what that costs
+     * is in the report's error estimate. Default 0: the call is refused and tells the bytes that it would need.
+     */
+    int32_t fit_memory;
+    /**
+     * Most rays that rows may send, those by way of mirrors not counted, but for 64 a row at least; 0 (default): as many
+     * as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
+     * goes on at a steady number of rays a second.
+     */
+    uint64_t ray_budget;
 } blik_settings;
 
 /**
@@ -668,6 +819,436 @@ typedef struct blik_intersector {
      */
     void *user;
 } blik_intersector;
+
+/**
+ * Numbers of a plane coupling.
+ */
+typedef struct blik_plane_coupling_info {
+    /**
+     * Unknowns: rows.
+     */
+    size_t unknowns;
+    /**
+     * Rows kept for each unknown: one for each number of reflections that is told apart.
+     */
+    size_t classes;
+    /**
+     * Rows that see something of the object.
+     */
+    size_t coupled_rows;
+    /**
+     * Rays traced.
+     */
+    uint64_t rays;
+    /**
+     * Largest share of the brightest light that chains of a row could still have brought which were cut: a bound.
+     */
+    double dropped;
+    /**
+     * Bytes in use.
+     */
+    size_t bytes;
+} blik_plane_coupling_info;
+
+/**
+ * A body of the plane model: a circle, or segments whose fronts are on the right of their direction (counter-clockwise
+ * for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners. Set
+ * by blik_plane_body_init first.
+ */
+typedef struct blik_plane_body {
+    /**
+     * `BLIK_PLANE_*`; default a circle.
+     */
+    int32_t shape;
+    /**
+     * Not 0: the segments stand for a smooth curve, whose normals and radiance are interpolated; default 0.
+     */
+    int32_t smooth;
+    /**
+     * Index of the material; default 0.
+     */
+    uint32_t material;
+    /**
+     * Elements of the circle, or of each segment, 1 to 2^20; default 1.
+     */
+    uint32_t elements;
+    /**
+     * Centre of a circle.
+     */
+    double centre[2];
+    /**
+     * Radius of a circle, positive; default 1.
+     */
+    double radius;
+    /**
+     * Two numbers a point; not read for a circle.
+     */
+    const double *points;
+    /**
+     * At least 2 of a polyline, 3 of a polygon, whose first is not repeated.
+     */
+    size_t point_count;
+} blik_plane_body;
+
+/**
+ * Reflectances of a body of the plane model. Set by blik_plane_material_init first.
+ */
+typedef struct blik_plane_material {
+    /**
+     * Diffuse reflectance, in [0, 1]; default 0.
+     */
+    double diffuse;
+    /**
+     * Mirror reflectance, in [0, 1], diffuse + specular <= 1; with gloss the lobe's albedo at normal view; default 0.
+     */
+    double specular;
+    /**
+     * 0 (default): an ideal mirror; else long over short axis of the lobe, >= 1 (1e4 and above: an ideal mirror).
+     */
+    double gloss_axis_ratio;
+    /**
+     * Full angle between the side rays of the paper's three, radians, 0 to 3.2.
+     */
+    double spacing;
+    /**
+     * `BLIK_PLANE_RAYS_*`: how rays stand for the lobe; default AUTO.
+     */
+    int32_t ray_set;
+    /**
+     * Rays of GAUSS, EQUAL and SPLIT at the first lobe of a path, at the second, and later: 1 to 4096.
+     */
+    uint32_t rays[3];
+} blik_plane_material;
+
+/**
+ * What a plane scene is made of. Set by blik_plane_bodies_init first. Read during the call only.
+ */
+typedef struct blik_plane_bodies {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * The bodies, at least one.
+     */
+    const struct blik_plane_body *bodies;
+    /**
+     * Number of bodies.
+     */
+    size_t body_count;
+    /**
+     * Bytes from one body to the next; set by the init function.
+     */
+    size_t body_stride;
+    /**
+     * The materials, at least one.
+     */
+    const struct blik_plane_material *materials;
+    /**
+     * Number of materials.
+     */
+    size_t material_count;
+    /**
+     * Bytes from one material to the next; set by the init function.
+     */
+    size_t material_stride;
+} blik_plane_bodies;
+
+/**
+ * How a plane scene is solved. Set by blik_plane_settings_init first: all but the tolerance follows from it.
+ */
+typedef struct blik_plane_settings {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * Wanted error relative to the sky, 1e-13 to 0.1, on bodies that are cut finely enough (a circle of 12 elements at
+     * 1e-4, 16 at 1e-5); default 1e-4.
+     */
+    double tolerance;
+    /**
+     * How the diffuse radiance varies, `BLIK_PLANE_AUTO` (default), `_CONSTANT`, `_LINEAR` or `_PANELS`.
+     */
+    int32_t basis;
+    /**
+     * Gauss points of an element, 1 to 6, where `basis` is PANELS.
+     */
+    uint32_t order;
+    /**
+     * How rows are integrated, `BLIK_PLANE_AUTO` (default), `_FACETS` or `_SPLIT`.
+     */
+    int32_t method;
+    /**
+     * Nodes or chains of the method, up to 4096, where that is not AUTO.
+     */
+    uint32_t points;
+    /**
+     * Light reflected more often does not count, 1 to 64; below 0 (default): by `cutoff`.
+     */
+    int32_t max_bounces;
+    /**
+     * Chains end where their mirrors leave less than this share, up to 1; below 0 (default): by tolerance.
+     */
+    double cutoff;
+    /**
+     * Bound on the solver's error relative to the brightest light, up to 1; below 0 (default): by tolerance.
+     */
+    double solver;
+} blik_plane_settings;
+
+/**
+ * Numbers of a plane scene.
+ */
+typedef struct blik_plane_scene_info {
+    /**
+     * Bodies.
+     */
+    size_t bodies;
+    /**
+     * Circles and segments.
+     */
+    size_t primitives;
+    /**
+     * Unknowns of the linear system.
+     */
+    size_t unknowns;
+    /**
+     * Bytes in use.
+     */
+    size_t bytes;
+} blik_plane_scene_info;
+
+/**
+ * A ray for blik_plane_first_hits and blik_plane_radiance.
+ */
+typedef struct blik_plane_ray {
+    /**
+     * Where it starts.
+     */
+    double origin[2];
+    /**
+     * Unit vector along it.
+     */
+    double direction[2];
+} blik_plane_ray;
+
+/**
+ * Where a ray of the plane meets a body first.
+ */
+typedef struct blik_plane_hit {
+    /**
+     * The point; (0, 0) where nothing is met.
+     */
+    double point[2];
+    /**
+     * Unit normal of the front.
+     */
+    double normal[2];
+    /**
+     * Circle or segment, counted over all bodies; `BLIK_NO_FACET` where nothing is met.
+     */
+    uint32_t primitive;
+    /**
+     * 1 where its front is met.
+     */
+    int32_t front;
+} blik_plane_hit;
+
+/**
+ * Radiance that arrives from the direction (x, y), a unit vector away from the object: finite, 0 to 1e37. Called by any
+ * number of threads at once.
+ */
+typedef double (*blik_plane_radiance_of)(void *user, double x, double y);
+
+/**
+ * The sky of a plane scene. Set by blik_plane_sky_init first.
+ */
+typedef struct blik_plane_sky {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * Radiance from everywhere where `radiance_of` is null; default 1.
+     */
+    double radiance;
+    /**
+     * Radiance by direction; null (default): `radiance`. It must not throw, and is in use as long as the solution.
+     */
+    blik_plane_radiance_of radiance_of;
+    /**
+     * Handed to `radiance_of`.
+     */
+    void *user;
+    /**
+     * Directions, two numbers each, at which `radiance_of` jumps or bends; copied.
+     */
+    const double *jumps;
+    /**
+     * At most `BLIK_PLANE_MAX_JUMPS`.
+     */
+    size_t jump_count;
+} blik_plane_sky;
+
+/**
+ * A point sun of a plane scene. Set by blik_plane_sun_init first.
+ */
+typedef struct blik_plane_sun {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * Toward the sun, of any length but zero; default (0, 1).
+     */
+    double direction[2];
+    /**
+     * Irradiance of a surface that faces it, radiance times angle; default 2, which gives a white one the radiance 1.
+     */
+    double irradiance;
+    /**
+     * The paper's cone: rays that leave the object after a mirror within this angle of the sun see it, radians up to
+     * 1.5. 0 (default): lobes are evaluated at the sun's direction, and ideal mirrors do not show it.
+     */
+    double capture_half_angle;
+    /**
+     * Radiance that such rays see; below 0 (default): the one that keeps the energy, irradiance over the cone's width.
+     */
+    double capture_radiance;
+} blik_plane_sun;
+
+/**
+ * The light of a plane scene. Set by blik_plane_light_init first. Read during the call only.
+ */
+typedef struct blik_plane_light {
+    /**
+     * Set by the init function.
+     */
+    size_t struct_size;
+    /**
+     * The sky; null (default): none.
+     */
+    const struct blik_plane_sky *sky;
+    /**
+     * The sun; null (default): none.
+     */
+    const struct blik_plane_sun *sun;
+} blik_plane_light;
+
+/**
+ * Numbers of a plane solution.
+ */
+typedef struct blik_plane_solution_info {
+    /**
+     * Contraction of a sweep over the linear system.
+     */
+    double contraction;
+    /**
+     * Bound on the solver's error of all radiances: certain where the contraction is below 1, else by the sweeps' decay.
+     */
+    double solver_error;
+    /**
+     * Sweeps made.
+     */
+    uint32_t sweeps;
+    /**
+     * Bytes in use.
+     */
+    size_t bytes;
+} blik_plane_solution_info;
+
+/**
+ * What a ray of the plane brings.
+ */
+typedef struct blik_plane_sample {
+    /**
+     * Place of an image's sample, along the direction that is clockwise of the view; 0 of blik_plane_radiance.
+     */
+    double abscissa;
+    /**
+     * Radiance: the sky's where nothing is met.
+     */
+    double radiance;
+    /**
+     * Bound on the light that chains could still have brought which were cut, as a share of the brightest.
+     */
+    double chain_tail;
+    /**
+     * Rays traced.
+     */
+    uint32_t rays;
+    /**
+     * 1 where the ray meets the object.
+     */
+    int32_t object;
+} blik_plane_sample;
+
+/**
+ * An unknown of a plane solution.
+ */
+typedef struct blik_plane_unknown {
+    /**
+     * Where it stands.
+     */
+    double point[2];
+    /**
+     * Unit normal of the surface there.
+     */
+    double normal[2];
+    /**
+     * Diffuse radiance without the sun's direct part.
+     */
+    double radiance;
+    /**
+     * Circle or segment, counted over all bodies.
+     */
+    uint32_t primitive;
+} blik_plane_unknown;
+
+/**
+ * A part of what a point of the plane sees.
+ */
+typedef struct blik_plane_span {
+    /**
+     * Sine of the angle to the normal at which it begins, counter-clockwise positive.
+     */
+    double from;
+    /**
+     * Sine at which it ends: half the difference is its form factor.
+     */
+    double to;
+    /**
+     * The circle or segment that is seen, `BLIK_NO_FACET` for the sky.
+     */
+    uint32_t primitive;
+} blik_plane_span;
+
+/**
+ * Closed forms of the lobe in the plane, for a specular reflectance of 1.
+ */
+typedef struct blik_plane_lobe {
+    /**
+     * Share of light from everywhere that it mirrors toward the view: 1 at normal view, 1/2 at grazing.
+     */
+    double albedo;
+    /**
+     * Its value per radian at the angle from the mirror direction.
+     */
+    double value;
+    /**
+     * Width of a top hat of its peak and visible energy, radians, eq. (19).
+     */
+    double equivalent_width;
+    /**
+     * Mean of the albedo over the angle of incidence, eq. (17).
+     */
+    double mean_albedo;
+    /**
+     * Mean of the albedo weighed by the cosine.
+     */
+    double cosine_mean_albedo;
+} blik_plane_lobe;
 
 /**
  * What was done on rows of an image; tallies of all its rows add up by blik_tally_add.
@@ -1271,11 +1852,274 @@ void blik_intersector_init(struct blik_intersector *intersector);
  *
  * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
  * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
- * Rays may come in any number at once (at present: one).
+ * Rays come up to 32 at once where none depends on what another meets (the first rays of form factors, of elements and of
+ * pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
  */
 int32_t blik_scene_set_intersector(const struct blik_scene *scene,
                                    const struct blik_intersector *intersector,
                                    struct blik_error *error);
+
+/**
+ * Bytes of memory with which blik_plane_coupling_init keeps all lanes of `run` busy; less is for fewer lanes.
+ */
+int32_t blik_plane_coupling_size(const struct blik_plane_scene *scene,
+                                 const struct blik_run *run,
+                                 struct blik_error *error,
+                                 size_t *bytes);
+
+/**
+ * Computes the extended form factors of all unknowns of a plane scene, eq. (12), in the caller's memory: once for its
+ * bodies and materials, whatever the light. The scene must outlive the coupling.
+ */
+int32_t blik_plane_coupling_init(const struct blik_plane_scene *scene,
+                                 const struct blik_run *run,
+                                 void *memory,
+                                 size_t size,
+                                 struct blik_error *error,
+                                 const struct blik_plane_coupling **coupling);
+
+#if defined(BLIK_STD)
+/**
+ * As blik_plane_coupling_init, in memory of its own; to be ended by blik_plane_coupling_destroy.
+ */
+int32_t blik_plane_coupling_create(const struct blik_plane_scene *scene,
+                                   const struct blik_run *run,
+                                   struct blik_error *error,
+                                   struct blik_plane_coupling **coupling);
+#endif
+
+/**
+ * Ends a plane coupling and frees what it owns; nothing for null. Solutions made from it must have ended before.
+ */
+void blik_plane_coupling_destroy(struct blik_plane_coupling *coupling);
+
+/**
+ * Numbers of a plane coupling.
+ */
+int32_t blik_plane_coupling_get_info(const struct blik_plane_coupling *coupling,
+                                     struct blik_error *error,
+                                     struct blik_plane_coupling_info *info);
+
+/**
+ * Rows `first` .. `first + count`: to `factors` for each row and class the extended form factors toward all unknowns, to
+ * `open` for each row and class what shows the sky. Either may be null.
+ */
+int32_t blik_plane_coupling_get_rows(const struct blik_plane_coupling *coupling,
+                                     size_t first,
+                                     size_t count,
+                                     struct blik_error *error,
+                                     double *factors,
+                                     double *open);
+
+/**
+ * Bytes of memory that blik_plane_scene_init needs for these bodies, at any address.
+ */
+int32_t blik_plane_scene_size(const struct blik_plane_bodies *bodies,
+                              struct blik_error *error,
+                              size_t *bytes);
+
+/**
+ * Checks bodies and settings and makes a plane scene of them in the caller's memory.
+ */
+int32_t blik_plane_scene_init(const struct blik_plane_bodies *bodies,
+                              const struct blik_plane_settings *settings,
+                              void *memory,
+                              size_t size,
+                              struct blik_error *error,
+                              const struct blik_plane_scene **scene);
+
+#if defined(BLIK_STD)
+/**
+ * As blik_plane_scene_init, in memory of its own; to be ended by blik_plane_scene_destroy.
+ */
+int32_t blik_plane_scene_create(const struct blik_plane_bodies *bodies,
+                                const struct blik_plane_settings *settings,
+                                struct blik_error *error,
+                                struct blik_plane_scene **scene);
+#endif
+
+/**
+ * Ends a plane scene and frees what it owns; nothing for null. Couplings made from it must have ended before.
+ */
+void blik_plane_scene_destroy(struct blik_plane_scene *scene);
+
+/**
+ * Numbers of a plane scene.
+ */
+int32_t blik_plane_scene_get_info(const struct blik_plane_scene *scene,
+                                  struct blik_error *error,
+                                  struct blik_plane_scene_info *info);
+
+/**
+ * The first circle or segment that each of `count` rays meets.
+ */
+int32_t blik_plane_first_hits(const struct blik_plane_scene *scene,
+                              const struct blik_plane_ray *rays,
+                              size_t count,
+                              struct blik_error *error,
+                              struct blik_plane_hit *hits);
+
+/**
+ * Bytes of memory with which blik_plane_solution_init keeps all lanes of `run` busy; less is for fewer lanes.
+ */
+int32_t blik_plane_solution_size(const struct blik_plane_coupling *coupling,
+                                 const struct blik_plane_light *light,
+                                 const struct blik_run *run,
+                                 struct blik_error *error,
+                                 size_t *bytes);
+
+/**
+ * Lights a plane scene and solves for its diffuse radiance in the caller's memory. The coupling must outlive the solution,
+ * and so must the sky's function, which must return finite values from 0 to 1e37: a solution whose sky ever returned
+ * another refuses that call and all later ones.
+ */
+int32_t blik_plane_solution_init(const struct blik_plane_coupling *coupling,
+                                 const struct blik_plane_light *light,
+                                 const struct blik_run *run,
+                                 void *memory,
+                                 size_t size,
+                                 struct blik_error *error,
+                                 const struct blik_plane_solution **solution);
+
+#if defined(BLIK_STD)
+/**
+ * As blik_plane_solution_init, in memory of its own; to be ended by blik_plane_solution_destroy.
+ */
+int32_t blik_plane_solution_create(const struct blik_plane_coupling *coupling,
+                                   const struct blik_plane_light *light,
+                                   const struct blik_run *run,
+                                   struct blik_error *error,
+                                   struct blik_plane_solution **solution);
+#endif
+
+/**
+ * Ends a plane solution and frees what it owns; nothing for null.
+ */
+void blik_plane_solution_destroy(struct blik_plane_solution *solution);
+
+/**
+ * Numbers of a plane solution.
+ */
+int32_t blik_plane_solution_get_info(const struct blik_plane_solution *solution,
+                                     struct blik_error *error,
+                                     struct blik_plane_solution_info *info);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_material_init(struct blik_plane_material *material);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_body_init(struct blik_plane_body *body);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_bodies_init(struct blik_plane_bodies *bodies);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_settings_init(struct blik_plane_settings *settings);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_sky_init(struct blik_plane_sky *sky);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_sun_init(struct blik_plane_sun *sun);
+
+/**
+ * Sets the defaults; does nothing with a null pointer.
+ */
+void blik_plane_light_init(struct blik_plane_light *light);
+
+/**
+ * Bytes of scratch memory with which blik_plane_image and blik_plane_radiance keep all lanes of `run` busy.
+ */
+int32_t blik_plane_scratch_size(const struct blik_plane_solution *solution,
+                                const struct blik_run *run,
+                                struct blik_error *error,
+                                size_t *bytes);
+
+/**
+ * Samples `first` .. `first + count` of the orthographic image of a plane scene with `samples` across, seen from the
+ * direction (sin `angle`, cos `angle`): samples are the centres of equal cells over the object's projection. However an
+ * image is split into calls, its bits are the same.
+ *
+ * `scratch` is memory of blik_plane_scratch_size bytes, or less, for fewer lanes; with the standard library it may be
+ * null, and is then taken from the heap. A call that is cancelled leaves part of the samples written.
+ */
+int32_t blik_plane_image(const struct blik_plane_solution *solution,
+                         double angle,
+                         size_t samples,
+                         size_t first,
+                         size_t count,
+                         const struct blik_run *run,
+                         void *scratch,
+                         size_t scratch_size,
+                         struct blik_error *error,
+                         struct blik_plane_sample *out);
+
+/**
+ * Radiance against each of `count` rays, which start on no body. Scratch memory as for blik_plane_image.
+ */
+int32_t blik_plane_radiance(const struct blik_plane_solution *solution,
+                            const struct blik_plane_ray *rays,
+                            size_t count,
+                            const struct blik_run *run,
+                            void *scratch,
+                            size_t scratch_size,
+                            struct blik_error *error,
+                            struct blik_plane_sample *out);
+
+/**
+ * Unknowns `first` .. `first + count` of a plane solution.
+ */
+int32_t blik_plane_get_unknowns(const struct blik_plane_solution *solution,
+                                size_t first,
+                                size_t count,
+                                struct blik_error *error,
+                                struct blik_plane_unknown *unknowns);
+
+/**
+ * Bytes of scratch memory for blik_plane_visible, and the most spans that it finds.
+ */
+int32_t blik_plane_visible_size(const struct blik_plane_scene *scene,
+                                struct blik_error *error,
+                                size_t *bytes,
+                                size_t *most_spans);
+
+/**
+ * What a point with a normal (of any length but zero) sees of a plane scene, split at every silhouette: spans in the order
+ * of rising sines. `skip` is the circle or segment on which the point is, or `BLIK_NO_FACET`. `capacity` entries of
+ * `spans` are there; more are an error that tells how many.
+ */
+int32_t blik_plane_visible(const struct blik_plane_scene *scene,
+                           const double *point,
+                           const double *normal,
+                           uint32_t skip,
+                           void *scratch,
+                           size_t scratch_size,
+                           struct blik_error *error,
+                           struct blik_plane_span *spans,
+                           size_t capacity,
+                           size_t *count);
+
+/**
+ * The lobe of a glossy material of the plane, seen at an angle to the normal of cosine `cos_view` in [0, 1], at `off`
+ * radians from the mirror direction.
+ */
+int32_t blik_plane_gloss(double gloss_axis_ratio,
+                         double cos_view,
+                         double off,
+                         struct blik_error *error,
+                         struct blik_plane_lobe *lobe);
 
 /**
  * The report of an image from the tally of all its rows; reads the whole coupling.
@@ -1353,7 +2197,8 @@ int32_t blik_any_hits(const struct blik_scene *scene,
 
 /**
  * Bytes of memory that blik_solution_init needs for this light, at any address. More speeds up scenes with
- * mirrors and a sun on several threads.
+ * mirrors and a sun on several threads. Where mirrors scatter sunlight over many more elements than usual, the call
+ * returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
  */
 int32_t blik_solution_size(const struct blik_coupling *coupling,
                            const struct blik_light *light,

@@ -166,6 +166,9 @@ private:
     static void destroy(blik_scene *handle) noexcept { blik_scene_destroy(handle); }
     static void destroy(blik_coupling *handle) noexcept { blik_coupling_destroy(handle); }
     static void destroy(blik_solution *handle) noexcept { blik_solution_destroy(handle); }
+    static void destroy(blik_plane_scene *handle) noexcept { blik_plane_scene_destroy(handle); }
+    static void destroy(blik_plane_coupling *handle) noexcept { blik_plane_coupling_destroy(handle); }
+    static void destroy(blik_plane_solution *handle) noexcept { blik_plane_solution_destroy(handle); }
 };
 
 #ifndef BLIK_STD
@@ -643,6 +646,279 @@ private:
     std::optional<blik::coupling> coupling_;
     std::optional<blik::solution> solution_;
 };
+
+/* The plane model: circles and polylines in two dimensions.
+ *
+ *     blik::plane::bodies bodies;
+ *     bodies.circle(-1.25, 0, 1, 0, 12).circle(1.25, 0, 1, 0, 12).material(0.3, 0.1);
+ *     blik::plane::scene scene(bodies, blik::plane::settings(1e-4));
+ *     blik::plane::coupling coupling(scene);
+ *     blik::plane::solution solution(coupling, blik::plane::light(blik::plane::sky(1.0)));
+ *     std::vector<blik_plane_sample> image = solution.image(0.3, 1000);
+ */
+namespace plane {
+
+/* Bodies and materials. */
+class bodies {
+public:
+    bodies &circle(double x, double y, double radius, uint32_t material, uint32_t elements) {
+        blik_plane_body body = blank(BLIK_PLANE_CIRCLE, material, elements);
+        body.centre[0] = x;
+        body.centre[1] = y;
+        body.radius = radius;
+        return add(body, {});
+    }
+    /* Segments from point to point, fronts on the right of their direction. */
+    bodies &polyline(std::vector<std::array<double, 2>> points, uint32_t material, uint32_t elements,
+                     bool smooth = false) {
+        blik_plane_body body = blank(BLIK_PLANE_POLYLINE, material, elements);
+        body.smooth = smooth;
+        return add(body, std::move(points));
+    }
+    /* The same, closed; counter-clockwise for a solid body. */
+    bodies &polygon(std::vector<std::array<double, 2>> points, uint32_t material, uint32_t elements,
+                    bool smooth = false) {
+        blik_plane_body body = blank(BLIK_PLANE_POLYGON, material, elements);
+        body.smooth = smooth;
+        return add(body, std::move(points));
+    }
+    /* Adds a material; its index is its place. */
+    bodies &material(double diffuse, double specular = 0.0, double gloss_axis_ratio = 0.0) {
+        blik_plane_material value;
+        blik_plane_material_init(&value);
+        value.diffuse = diffuse;
+        value.specular = specular;
+        value.gloss_axis_ratio = gloss_axis_ratio;
+        return material(value);
+    }
+    bodies &material(const blik_plane_material &value) {
+        materials_.push_back(value);
+        return *this;
+    }
+
+    /* Calls `with` with the struct of the C interface. */
+    template <typename W>
+    auto with(W with) const {
+        std::vector<blik_plane_body> all = bodies_;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            all[i].points = points_[i].empty() ? nullptr : points_[i].data()->data();
+            all[i].point_count = points_[i].size();
+        }
+        blik_plane_bodies value;
+        blik_plane_bodies_init(&value);
+        value.bodies = all.data();
+        value.body_count = all.size();
+        value.materials = materials_.data();
+        value.material_count = materials_.size();
+        return with(value);
+    }
+
+private:
+    static blik_plane_body blank(int32_t shape, uint32_t material, uint32_t elements) {
+        blik_plane_body body;
+        blik_plane_body_init(&body);
+        body.shape = shape;
+        body.material = material;
+        body.elements = elements;
+        return body;
+    }
+    bodies &add(const blik_plane_body &body, std::vector<std::array<double, 2>> points) {
+        points_.push_back(std::move(points));
+        bodies_.push_back(body);
+        return *this;
+    }
+    std::vector<blik_plane_body> bodies_;
+    std::vector<std::vector<std::array<double, 2>>> points_;
+    std::vector<blik_plane_material> materials_;
+};
+
+/* blik_plane_settings with its defaults. */
+inline blik_plane_settings settings(double tolerance = 1e-4) {
+    blik_plane_settings value;
+    blik_plane_settings_init(&value);
+    value.tolerance = tolerance;
+    return value;
+}
+
+/* The same radiance from everywhere. */
+inline blik_plane_sky sky(double radiance = 1.0) {
+    blik_plane_sky value;
+    blik_plane_sky_init(&value);
+    value.radiance = radiance;
+    return value;
+}
+
+/* A point sun; irradiance 2 by default. */
+inline blik_plane_sun sun(const std::array<double, 2> &direction, double irradiance = 2.0) {
+    blik_plane_sun value;
+    blik_plane_sun_init(&value);
+    value.direction[0] = direction[0];
+    value.direction[1] = direction[1];
+    value.irradiance = irradiance;
+    return value;
+}
+
+/* A sky, a sun or both; copied, but for what they point to. */
+class light {
+public:
+    explicit light(const blik_plane_sky &sky) : sky_(sky), has_sky_(true) {}
+    explicit light(const blik_plane_sun &sun) : sun_(sun), has_sun_(true) {}
+    light(const blik_plane_sky &sky, const blik_plane_sun &sun)
+        : sky_(sky), sun_(sun), has_sky_(true), has_sun_(true) {}
+    blik_plane_light get() const noexcept {
+        blik_plane_light value;
+        blik_plane_light_init(&value);
+        value.sky = has_sky_ ? &sky_ : nullptr;
+        value.sun = has_sun_ ? &sun_ : nullptr;
+        return value;
+    }
+
+private:
+    blik_plane_sky sky_{};
+    blik_plane_sun sun_{};
+    bool has_sky_ = false;
+    bool has_sun_ = false;
+};
+
+/* Checked bodies with the settings by which they are solved. */
+class scene {
+public:
+    explicit scene(const bodies &bodies, const blik_plane_settings &settings = plane::settings()) {
+        bodies.with([&](const blik_plane_bodies &all) {
+#ifdef BLIK_STD
+            blik_error info{};
+            check(blik_plane_scene_create(&all, &settings, &info, &owner_.handle_), info);
+#else
+            owner_ = detail::in_memory<blik_plane_scene>(
+                [&](blik_error *e, std::size_t *bytes) { return blik_plane_scene_size(&all, e, bytes); },
+                [&](void *memory, std::size_t bytes, blik_error *e, const blik_plane_scene **out) {
+                    return blik_plane_scene_init(&all, &settings, memory, bytes, e, out);
+                });
+#endif
+        });
+    }
+    const blik_plane_scene *get() const noexcept { return owner_.get(); }
+    blik_plane_scene_info info() const {
+        blik_error info{};
+        blik_plane_scene_info value{};
+        check(blik_plane_scene_get_info(get(), &info, &value), info);
+        return value;
+    }
+    /* The first circle or segment that each ray meets. */
+    std::vector<blik_plane_hit> first_hits(view<const blik_plane_ray> rays) const {
+        std::vector<blik_plane_hit> out(rays.size());
+        blik_error info{};
+        check(blik_plane_first_hits(get(), rays.data(), rays.size(), &info, out.data()), info);
+        return out;
+    }
+    /* What a point with a normal sees; `skip`: the circle or segment on which it is. */
+    std::vector<blik_plane_span> visible(const std::array<double, 2> &point, const std::array<double, 2> &normal,
+                                         uint32_t skip = BLIK_NO_FACET) const {
+        blik_error info{};
+        std::size_t bytes = 0, most = 0;
+        check(blik_plane_visible_size(get(), &info, &bytes, &most), info);
+        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
+        std::vector<blik_plane_span> out(most);
+        check(blik_plane_visible(get(), point.data(), normal.data(), skip, scratch.get(), bytes, &info, out.data(),
+                                 out.size(), &most),
+              info);
+        out.resize(most);
+        return out;
+    }
+
+private:
+    detail::owner<blik_plane_scene> owner_;
+};
+
+/* Extended form factors of a plane scene, which must outlive it. */
+class coupling {
+public:
+    explicit coupling(const scene &scene, const blik_run &run = alone()) {
+#ifdef BLIK_STD
+        blik_error info{};
+        check(blik_plane_coupling_create(scene.get(), &run, &info, &owner_.handle_), info);
+#else
+        owner_ = detail::in_memory<blik_plane_coupling>(
+            [&](blik_error *e, std::size_t *bytes) { return blik_plane_coupling_size(scene.get(), &run, e, bytes); },
+            [&](void *memory, std::size_t bytes, blik_error *e, const blik_plane_coupling **out) {
+                return blik_plane_coupling_init(scene.get(), &run, memory, bytes, e, out);
+            });
+#endif
+    }
+    const blik_plane_coupling *get() const noexcept { return owner_.get(); }
+    blik_plane_coupling_info info() const {
+        blik_error info{};
+        blik_plane_coupling_info value{};
+        check(blik_plane_coupling_get_info(get(), &info, &value), info);
+        return value;
+    }
+
+private:
+    detail::owner<blik_plane_coupling> owner_;
+};
+
+/* A plane scene under one light, solved; its coupling must outlive it. */
+class solution {
+public:
+    solution(const coupling &coupling, const light &light, const blik_run &run = alone()) {
+        const blik_plane_light value = light.get();
+#ifdef BLIK_STD
+        blik_error info{};
+        check(blik_plane_solution_create(coupling.get(), &value, &run, &info, &owner_.handle_), info);
+#else
+        owner_ = detail::in_memory<blik_plane_solution>(
+            [&](blik_error *e, std::size_t *bytes) {
+                return blik_plane_solution_size(coupling.get(), &value, &run, e, bytes);
+            },
+            [&](void *memory, std::size_t bytes, blik_error *e, const blik_plane_solution **out) {
+                return blik_plane_solution_init(coupling.get(), &value, &run, memory, bytes, e, out);
+            });
+#endif
+    }
+    const blik_plane_solution *get() const noexcept { return owner_.get(); }
+    blik_plane_solution_info info() const {
+        blik_error info{};
+        blik_plane_solution_info value{};
+        check(blik_plane_solution_get_info(get(), &info, &value), info);
+        return value;
+    }
+    /* The image seen from the direction (sin angle, cos angle). */
+    std::vector<blik_plane_sample> image(double angle, std::size_t samples, const blik_run &run = alone()) const {
+        std::vector<blik_plane_sample> out(samples);
+        with_scratch(run, [&](void *scratch, std::size_t bytes, blik_error *info) {
+            return blik_plane_image(get(), angle, samples, 0, samples, &run, scratch, bytes, info, out.data());
+        });
+        return out;
+    }
+    /* Radiance against each ray. */
+    std::vector<blik_plane_sample> radiance(view<const blik_plane_ray> rays, const blik_run &run = alone()) const {
+        std::vector<blik_plane_sample> out(rays.size());
+        with_scratch(run, [&](void *scratch, std::size_t bytes, blik_error *info) {
+            return blik_plane_radiance(get(), rays.data(), rays.size(), &run, scratch, bytes, info, out.data());
+        });
+        return out;
+    }
+    /* All unknowns of the scene that it was made of. */
+    std::vector<blik_plane_unknown> unknowns(const plane::scene &scene) const {
+        std::vector<blik_plane_unknown> out(scene.info().unknowns);
+        blik_error info{};
+        check(blik_plane_get_unknowns(get(), 0, out.size(), &info, out.data()), info);
+        return out;
+    }
+
+private:
+    template <typename F>
+    void with_scratch(const blik_run &run, F call) const {
+        blik_error info{};
+        std::size_t bytes = 0;
+        check(blik_plane_scratch_size(get(), &run, &info, &bytes), info);
+        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
+        check(call(scratch.get(), bytes, &info), info);
+    }
+    detail::owner<blik_plane_solution> owner_;
+};
+
+} // namespace plane
 
 } // namespace blik
 

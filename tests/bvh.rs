@@ -86,6 +86,15 @@ fn assert_like_brute_force(mesh: &[Facet], rays: &[Ray]) {
             assert_eq!(bvh.closest(ray), *want, "{ray:?}");
             assert_eq!(bvh.occluded(ray), want.is_some(), "{ray:?}");
         }
+        // together they find the same, however many there are
+        for count in [rays.len(), 1, 127, 129] {
+            let n = count.min(rays.len());
+            let (mut hits, mut occluded) = (vec![None; n], vec![true; n]);
+            bvh.closest_many(&rays[..n], &mut hits);
+            bvh.occluded_many(&rays[..n], &mut occluded);
+            assert_eq!(hits, want[..n]);
+            assert!(occluded.iter().zip(&want[..n]).all(|(occluded, want)| *occluded == want.is_some()));
+        }
     });
 }
 

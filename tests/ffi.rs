@@ -3,6 +3,8 @@
 
 #[path = "support/case.rs"]
 mod case;
+#[path = "ffi/plane.rs"]
+mod plane;
 mod support;
 
 use blik::*;

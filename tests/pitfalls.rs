@@ -318,3 +318,24 @@ fn a_sky_table_has_no_seam() {
         }
     }
 }
+
+// what stands under a body counted in the mean of what shows beside it
+
+#[test]
+fn only_what_shows_of_a_floor_counts() {
+    let mut mesh = Mesh::default();
+    mesh.rectangle(dvec3(-1.0, -1.0, 0.0), DVec3::X * 2.0, DVec3::Y * 2.0, 1, 0);
+    // a leaning box through the floor, whose section there is a parallelogram of 0.6 x 0.49
+    let lean = |p: DVec3| dvec3(-0.27 + 0.6 * p.x + 0.3 * p.z, -0.31 + 0.49 * p.y, p.z - 0.5);
+    mesh = mesh.joined(&scenes::cube_outside().mapped(lean).of_material(1));
+    let case = Case::new(mesh, &[Material::new(1.0, 0.0), Material::new(0.0, 0.0)]).sky(SkyOf::uniform(1));
+    let shown = case.with_geometry(0, &within(3e-2), |_, geometry| {
+        let (elements, coupling) = (geometry.elements(), geometry.coupling().unwrap());
+        let of = |u: usize| elements.share(u) * f64::from(coupling.row(u).exposed);
+        (0..2).flat_map(|facet| elements.unknowns_of(facet, 0)).map(of).sum::<f64>() / 2.0
+    });
+    let truth = 1.0 - 0.6 * 0.49 / 4.0;
+    // elements at the box's edge are a tenth of the floor, each off by its 64 rays' noise of 4 %; whole sixteenths of them,
+    // which are taken to lie inside if most of their rays do, would bring 2 % of the floor
+    assert!((shown - truth).abs() < 6e-3, "{shown}, not {truth}");
+}

@@ -26,7 +26,7 @@ fn baked(
     if solution.is_some_and(|s| !core::ptr::eq(s.coupling, coupling)) {
         return Err(blik_error::of(BLIK_ERROR_HANDLE));
     }
-    let Settings { tolerance, max_bounces, all, directional } = coupling.settings;
+    let Settings { tolerance, max_bounces, all, directional, .. } = coupling.settings;
     let solution = solution.map(|s| bake::Solution {
         sky: s.input.0,
         sun: s.input.1,
@@ -189,7 +189,7 @@ pub unsafe extern "C" fn blik_load(
             None => None,
         };
         let bake::Settings { tolerance, max_bounces, all, directional } = baked.settings;
-        let settings = Settings { tolerance, max_bounces, all, directional };
+        let settings = Settings::baked(tolerance, max_bounces, all, directional);
         // SAFETY: `place` made room for each; the handles live as long as the caller's memory.
         unsafe {
             scene_at.write(blik_scene::new(baked.scene, baked.bvh));

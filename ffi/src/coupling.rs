@@ -50,6 +50,10 @@ pub(crate) struct Settings {
     pub max_bounces: Option<u32>,
     pub all: bool,
     pub directional: bool,
+    /// Fewer rays rather than no room.
+    fit: bool,
+    /// Most first rays of all rows.
+    budget: Option<u64>,
 }
 
 impl Settings {
@@ -64,11 +68,24 @@ impl Settings {
             max_bounces: u32::try_from(settings.max_bounces).ok(),
             all: settings.all_irradiances != 0,
             directional: settings.directional != 0,
+            fit: settings.fit_memory != 0,
+            budget: Some(settings.ray_budget).filter(|&rays| rays > 0),
         })
     }
 
     fn rows(&self, base: &blik_scene) -> RowSettings {
         RowSettings::new(&base.scene, self.tolerance, self.max_bounces, self.directional, self.all)
+    }
+
+    /// Those of a baked coupling.
+    pub(crate) fn baked(tolerance: f64, max_bounces: Option<u32>, all: bool, directional: bool) -> Settings {
+        Settings { tolerance, max_bounces, all, directional, fit: false, budget: None }
+    }
+
+    /// The same for so many rows, within the budget.
+    fn rows_within(&self, base: &blik_scene, count: usize) -> RowSettings {
+        let rows = self.rows(base);
+        self.budget.map_or(rows, |budget| rows.within(count, budget))
     }
 }
 
@@ -376,7 +393,10 @@ fn most_blocks(rows: usize) -> usize {
 
 /// Bytes to begin with: elements, tables of blocks, one row while it grows.
 fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
-    let rows = settings.rows(base);
+    let mut rows = settings.rows(base);
+    while let Some(fewer) = rows.fewer().filter(|_| settings.fit) {
+        rows = fewer;
+    }
     let unknowns = subdivide::most_elements(base.scene.facets(), settings.tolerance) * base.scene.sides();
     let row = sink::bytes(piece(unknowns), 64, policy::unmerged(&rows), base.scene.bands())?;
     let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
@@ -412,29 +432,25 @@ fn build(
     let (place, rest) = place::<blik_coupling>(memory)?;
     let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) };
     let elements = elements(base, settings, runner, &mut cutter)?;
-    let rows = settings.rows(base);
+    let mut rows = settings.rows_within(base, elements.unknowns());
     let most = most_blocks(elements.unknowns());
     let spots = table(&mut cutter, most, Spot::default())?;
     let room = (most * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
     let size = cutter.size.saturating_sub(room);
-    let mut filler = Filler {
-        base,
-        elements: &elements,
-        rows: &rows,
-        start: Start(cutter.start),
-        size,
-        spots,
-        used: 0,
-        end: 0,
-    };
-    filler.run(runner).map_err(|mut error| {
-        if error.status == BLIK_ERROR_BUFFER_TOO_SMALL {
-            error.needed = error.needed.saturating_add(given - filler.size);
-            error.given = given;
+    let (used, end) = loop {
+        let (elements, rows_now) = (&elements, &rows);
+        let start = Start(cutter.start);
+        let mut filler =
+            Filler { base, elements, rows: rows_now, start, size, spots: &mut *spots, used: 0, end: 0 };
+        let Err(error) = filler.run(runner) else { break (filler.used, filler.end) };
+        if error.status != BLIK_ERROR_BUFFER_TOO_SMALL {
+            return Err(error);
         }
-        error
-    })?;
-    let (used, end) = (filler.used, filler.end);
+        match rows.fewer().filter(|_| settings.fit) {
+            Some(fewer) => rows = fewer,
+            None => return Err(error.sizes(error.needed.saturating_add(given - size), given)),
+        }
+    };
     let done = spots.get_mut(..used).unwrap_or_default();
     sort(done, |s| s.first);
     let all: &'static [u8] = cutter.take(end)?;
@@ -606,7 +622,7 @@ mod owned {
         let mut own = Slab::new(Elements::bytes(&cut)?)?;
         // SAFETY: the handle owns the slab.
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
-        let rows = settings.rows(base);
+        let rows = settings.rows_within(base, elements.unknowns());
         let (unknowns, piece) = (elements.unknowns(), piece(elements.unknowns()));
         let done = Mutex::new(Vec::new());
         runner.each(unknowns.div_ceil(piece), runner.lanes(), 1.0 - PROBING, &|_, item| {

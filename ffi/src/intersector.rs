@@ -5,7 +5,7 @@ use crate::memory::*;
 use crate::scene::{blik_ray, blik_scene};
 use crate::status::*;
 use crate::types::{Sized_, read, sized};
-use blik_kernel::bvh::Intersector;
+use blik_kernel::bvh::{BATCH, Intersector, NO_FACET};
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::Scene;
 use core::ffi::c_void;
@@ -58,7 +58,8 @@ pub unsafe extern "C" fn blik_intersector_init(intersector: *mut blik_intersecto
 ///
 /// Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
 /// facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
-/// Rays may come in any number at once (at present: one).
+/// Rays come up to 32 at once where none depends on what another meets (the first rays of form factors, of elements and of
+/// pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -109,23 +110,50 @@ impl Caller {
             skip: ray.skip,
         }
     }
+
+    /// Hands the rays out in batches, each with its place among the answers.
+    fn batches(&self, rays: &[Ray], answers: &mut [u32], ask: impl Fn(&[blik_ray], &mut [u32])) {
+        let none =
+            blik_ray { origin: [0.0; 3], direction: [0.0; 3], t_max: 0.0, skip: crate::scene::BLIK_NO_FACET };
+        let (mut rays, mut answers) = (rays, answers);
+        while !rays.is_empty() {
+            let count = rays.len().min(BATCH);
+            let (Some((now, later)), Some((out, rest))) =
+                (rays.split_at_checked(count), answers.split_at_mut_checked(count))
+            else {
+                return;
+            };
+            let mut outside = [none; BATCH];
+            for (to, ray) in outside.iter_mut().zip(now) {
+                *to = self.outside(ray);
+            }
+            ask(outside.get(..count).unwrap_or_default(), out);
+            (rays, answers) = (later, rest);
+        }
+    }
 }
 
 impl Intersector for Caller {
-    fn first(&self, ray: &Ray) -> Option<u32> {
-        let (ray, mut facet) = (self.outside(ray), u32::MAX);
-        if let Some(find) = self.tracer.first_facets {
-            // SAFETY: the caller's function, with the caller's pointer.
-            unsafe { find(self.tracer.user, &raw const ray, 1, &raw mut facet) };
-        }
-        (facet != u32::MAX).then_some(facet)
+    fn first(&self, rays: &[Ray], facets: &mut [u32]) {
+        facets.fill(NO_FACET);
+        let Some(find) = self.tracer.first_facets else { return };
+        self.batches(rays, facets, |rays, facets| {
+            // SAFETY: the caller's function, with the caller's pointer, and as many answers as rays.
+            unsafe { find(self.tracer.user, rays.as_ptr(), rays.len(), facets.as_mut_ptr()) };
+        });
     }
 
-    fn any(&self, ray: &Ray) -> bool {
-        let Some(find) = self.tracer.any_facets else { return self.first(ray).is_some() };
-        let (ray, mut hit) = (self.outside(ray), 0);
-        // SAFETY: as above.
-        unsafe { find(self.tracer.user, &raw const ray, 1, &raw mut hit) };
-        hit != 0
+    fn any(&self, rays: &[Ray], hits: &mut [u32]) {
+        let Some(find) = self.tracer.any_facets else {
+            self.first(rays, hits);
+            hits.iter_mut().for_each(|hit| *hit = u32::from(*hit != NO_FACET));
+            return;
+        };
+        self.batches(rays, hits, |rays, hits| {
+            let mut found = [0; BATCH];
+            // SAFETY: as above; a batch is no longer than the array.
+            unsafe { find(self.tracer.user, rays.as_ptr(), rays.len(), found.as_mut_ptr()) };
+            hits.iter_mut().zip(found).for_each(|(hit, found)| *hit = u32::from(found));
+        });
     }
 }

@@ -12,6 +12,7 @@ mod form_factor;
 mod intersector;
 mod memory;
 mod mesh;
+mod plane;
 mod report;
 mod run;
 mod scene;
@@ -26,6 +27,7 @@ pub use form_factor::*;
 pub use intersector::{
     blik_any_facets, blik_first_facets, blik_intersector, blik_intersector_init, blik_scene_set_intersector,
 };
+pub use plane::*;
 pub use report::*;
 #[cfg(feature = "std")]
 pub use run::blik_run_on_threads;

@@ -74,6 +74,11 @@ pub unsafe extern "C" fn blik_get_report(
         let tally = needed(tally.cast_mut())?;
         // SAFETY: by the caller's promise.
         let (solution, tally): (&blik_solution, _) = unsafe { (object(solution)?, tally.read()) };
+        for value in [tally.noise_squared, tally.sampling_squared, tally.chain_tail] {
+            if !(0.0..f64::INFINITY).contains(&value) {
+                return Err(blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_TALLY).at(0, 0, value));
+            }
+        }
         let coupling = solution.coupling.info()?;
         let (base, tables) = (solution.coupling.base, &solution.tables);
         let tolerance = solution.coupling.settings.tolerance;

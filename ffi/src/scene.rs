@@ -7,7 +7,7 @@ use crate::run::{Runner, blik_run};
 use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
-use blik_kernel::bvh::Bvh;
+use blik_kernel::bvh::{Ahead, Bvh};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::{Mesh, Scene};
@@ -240,6 +240,9 @@ pub unsafe extern "C" fn blik_scene_get_info(
     })
 }
 
+/// Stands where there is no ray.
+const NO_RAY: blik_ray = blik_ray { origin: [0.0; 3], direction: [0.0; 3], t_max: 0.0, skip: BLIK_NO_FACET };
+
 /// The kernel's ray for a caller's: scene coordinates, in which distances are `scale` times as long.
 fn inside(scene: &Scene<'_>, ray: &blik_ray) -> Ray {
     Ray {
@@ -268,8 +271,10 @@ pub unsafe extern "C" fn blik_closest_hits(
         let (handle, rays, out, mut runner) =
             unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
         runner.rows(out, 1, 1.0, |range, out| {
-            for (ray, out) in rays.iter().skip(range.start).zip(out) {
-                let hit = handle.bvh.closest(&inside(&handle.scene, ray));
+            let (mut ahead, own) = (Ahead::default(), rays.get(range).unwrap_or_default());
+            let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));
+            for (n, out) in (0..own.len() as u32).zip(out) {
+                let hit = handle.bvh.closest_of(&mut ahead, n, own.len() as u32, any);
                 *out = match hit {
                     None => blik_hit { t: f64::INFINITY, u: 0.0, v: 0.0, facet: BLIK_NO_FACET, front: 0 },
                     Some(hit) => blik_hit {
@@ -304,8 +309,10 @@ pub unsafe extern "C" fn blik_any_hits(
         let (handle, rays, out, mut runner) =
             unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
         runner.rows(out, 1, 1.0, |range, out| {
-            for (ray, out) in rays.iter().skip(range.start).zip(out) {
-                *out = u8::from(handle.bvh.occluded(&inside(&handle.scene, ray)));
+            let (mut ahead, own) = (Ahead::default(), rays.get(range).unwrap_or_default());
+            let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));
+            for (n, out) in (0..own.len() as u32).zip(out) {
+                *out = u8::from(handle.bvh.occluded_of(&mut ahead, n, own.len() as u32, any));
             }
             Ok(())
         })

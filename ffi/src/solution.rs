@@ -231,7 +231,7 @@ impl Sizes {
         let (mut beams, mut images) = (0, (0, 0));
         let unknowns = coupling.elements.unknowns();
         if let Some(settings) = light.sun.as_ref().and_then(|sun| beam_settings(coupling, sun)) {
-            beams = sink::bytes(16, 64, 2 * beam::most_rays(scene, &settings), scene.bands())?;
+            beams = sink::bytes(16, 64, beam::unmerged(scene, &coupling.elements, &settings), scene.bands())?;
             let sides = coupling.elements.facet_sides();
             images = (sun_image::places(sides), unknowns * shape.levels * shape.bands);
         }
@@ -478,6 +478,7 @@ impl Shine<'_> {
 
     /// Adds the sunlight that mirrors throw: each lane traces its rows in its part of the scratch memory, and the
     /// results are added in the order of the rows.
+    #[inline(never)]
     fn beams(
         &self,
         sun: &Sun<'_>,
@@ -489,7 +490,7 @@ impl Shine<'_> {
         let (base, elements) = (self.coupling.base, &self.coupling.elements);
         let (scene, rows) = (&base.scene, base.scene.facets() * base.scene.sides());
         let piece = rows.div_ceil(256).clamp(16, 1024);
-        let usual = sink::bytes(piece, 64, 2 * beam::most_rays(scene, settings), scene.bands())?;
+        let usual = sink::bytes(piece, 64, beam::unmerged(scene, elements, settings), scene.bands())?;
         let mut lanes = runner.lanes().min(scratch.len() / usual.max(1)).max(1);
         let (mut next, mut traced) = (0, 0);
         let size = scratch.len();
@@ -498,7 +499,7 @@ impl Shine<'_> {
             let part = (size / lanes.max(1)) & !(ALIGNMENT - 1);
             let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
             let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
-            let mut done = [0; MOST_LANES];
+            let mut done = [0u16; MOST_LANES];
             let noted = Start(done.as_mut_ptr());
             let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (rows + lanes * piece) as f64;
             runner.each(lanes, lanes, share, &|_, lane| {
@@ -511,7 +512,7 @@ impl Shine<'_> {
                     (memory, &mut *noted.at(lane))
                 };
                 match beam::fill(scene, &base.bvh, elements, sun, settings, range(lane), memory) {
-                    Ok(rows) => *noted = rows,
+                    Ok(rows) => *noted = rows as u16, // a piece has at most 1024
                     Err(Error::BufferTooSmall { .. }) => {}
                     Err(error) => return Err(error.into()),
                 }
@@ -519,6 +520,7 @@ impl Shine<'_> {
             })?;
             let before = next;
             for (lane, done) in done.into_iter().enumerate().take(lanes).filter(|(_, done)| *done > 0) {
+                let done = usize::from(done);
                 let wanted: Range<usize> =
                     (before + lane * piece).min(rows)..(before + (lane + 1) * piece).min(rows);
                 if wanted.start != next {
@@ -686,7 +688,8 @@ impl Solve<'_> {
 }
 
 /// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with
-/// mirrors and a sun on several threads.
+/// mirrors and a sun on several threads. Where mirrors scatter sunlight over many more elements than usual, the call
+/// returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.

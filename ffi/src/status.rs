@@ -1,5 +1,6 @@
 //! Status codes, the fields that they speak of, and what a refused call tells besides.
 
+use blik_kernel::plane::scene::{BODY_ELEMENTS, BODY_RADIUS};
 use blik_kernel::{Error, Field};
 use core::ffi::{CStr, c_char};
 
@@ -27,10 +28,10 @@ pub const BLIK_ERROR_LENGTH: i32 = 6;
 /// More of something than there may be; `needed` is the limit.
 pub const BLIK_ERROR_TOO_MANY: i32 = 7;
 
-/// The mesh has no facets.
+/// The mesh has no facets, or the plane scene no bodies.
 pub const BLIK_ERROR_NO_FACETS: i32 = 8;
 
-/// The mesh has no materials.
+/// The mesh or the plane scene has no materials.
 pub const BLIK_ERROR_NO_MATERIALS: i32 = 9;
 
 /// The number of spectral bands is outside 1 to 64; `given`.
@@ -51,7 +52,7 @@ pub const BLIK_ERROR_VERTEX_INDEX: i32 = 14;
 /// Facet `index` has a normal index (`value`) out of range.
 pub const BLIK_ERROR_NORMAL_INDEX: i32 = 15;
 
-/// Facet `index` has a material (`value`) that there is not.
+/// Facet or plane body `index` has a material (`value`) that there is not.
 pub const BLIK_ERROR_MATERIAL_INDEX: i32 = 16;
 
 /// `field` of material `index` is out of range in `band`.
@@ -90,6 +91,9 @@ pub const BLIK_ERROR_MEMORY: i32 = 27;
 /// A fault of the library; please report it.
 pub const BLIK_ERROR_INTERNAL: i32 = 28;
 
+/// Body `index` of a plane scene is no circle or polyline; `field` tells why.
+pub const BLIK_ERROR_BODY: i32 = 29;
+
 fn status_text(number: i32) -> &'static CStr {
     match number {
         BLIK_OK => c"done",
@@ -99,9 +103,9 @@ fn status_text(number: i32) -> &'static CStr {
         BLIK_ERROR_HANDLE => c"a handle is not valid, or belongs to another scene",
         BLIK_ERROR_BUFFER_TOO_SMALL => c"memory is too small",
         BLIK_ERROR_LENGTH => c"an array has the wrong number of entries",
-        BLIK_ERROR_TOO_MANY => c"too many facets, elements or bytes",
-        BLIK_ERROR_NO_FACETS => c"the mesh has no facets",
-        BLIK_ERROR_NO_MATERIALS => c"the mesh has no materials",
+        BLIK_ERROR_TOO_MANY => c"more of something than there may be",
+        BLIK_ERROR_NO_FACETS => c"there are no facets",
+        BLIK_ERROR_NO_MATERIALS => c"there are no materials",
         BLIK_ERROR_BANDS => c"the number of bands is not in 1 to 64",
         BLIK_ERROR_VERTEX => c"a vertex is not finite",
         BLIK_ERROR_NORMAL => c"a vertex normal is zero or not finite",
@@ -121,6 +125,7 @@ fn status_text(number: i32) -> &'static CStr {
         BLIK_ERROR_ALIGNMENT => c"memory is not aligned",
         BLIK_ERROR_MEMORY => c"out of memory",
         BLIK_ERROR_INTERNAL => c"internal error",
+        BLIK_ERROR_BODY => c"a body of the plane model is not valid",
         _ => c"unknown status",
     }
 }
@@ -203,6 +208,27 @@ pub const BLIK_FIELD_DIRECTION: i32 = 24;
 /// A range of rows.
 pub const BLIK_FIELD_ROWS: i32 = 25;
 
+/// Reflections that count.
+pub const BLIK_FIELD_MAX_BOUNCES: i32 = 26;
+
+/// Gauss points of an element of the plane model.
+pub const BLIK_FIELD_PLANE_ORDER: i32 = 27;
+
+/// Nodes or chains of a method of the plane model.
+pub const BLIK_FIELD_PLANE_POINTS: i32 = 28;
+
+/// Elements of a body of the plane model.
+pub const BLIK_FIELD_BODY_ELEMENTS: i32 = 29;
+
+/// Radius of a body of the plane model.
+pub const BLIK_FIELD_BODY_RADIUS: i32 = 30;
+
+/// Coordinates of a body of the plane model: not finite, beyond 1e100, too few points, or two that coincide.
+pub const BLIK_FIELD_BODY_POINTS: i32 = 31;
+
+/// What a tally says of errors.
+pub const BLIK_FIELD_TALLY: i32 = 32;
+
 fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
@@ -231,6 +257,13 @@ fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_RESOLUTION => c"camera columns or rows",
         BLIK_FIELD_DIRECTION => c"direction",
         BLIK_FIELD_ROWS => c"rows",
+        BLIK_FIELD_MAX_BOUNCES => c"max_bounces",
+        BLIK_FIELD_PLANE_ORDER => c"plane order",
+        BLIK_FIELD_PLANE_POINTS => c"plane points",
+        BLIK_FIELD_BODY_ELEMENTS => c"body elements",
+        BLIK_FIELD_BODY_RADIUS => c"body radius",
+        BLIK_FIELD_BODY_POINTS => c"body points",
+        BLIK_FIELD_TALLY => c"tally",
         _ => c"",
     }
 }
@@ -316,6 +349,14 @@ impl From<Error> for blik_error {
             }
             Error::Direction { field } => e::of(BLIK_ERROR_DIRECTION).field(number(field)),
             Error::CameraFrame { field } => e::of(BLIK_ERROR_CAMERA).field(number(field)),
+            Error::Body { body, what } => {
+                let field = match what {
+                    BODY_ELEMENTS => BLIK_FIELD_BODY_ELEMENTS,
+                    BODY_RADIUS => BLIK_FIELD_BODY_RADIUS,
+                    _ => BLIK_FIELD_BODY_POINTS,
+                };
+                e::of(BLIK_ERROR_BODY).field(field).at(body, 0, 0.0)
+            }
             Error::Mismatch { what: "coupling without directions" } => e::of(BLIK_ERROR_NOT_DIRECTIONAL),
             Error::Mismatch { .. } => e::of(BLIK_ERROR_HANDLE),
             Error::Diverges { row_sum } => e::of(BLIK_ERROR_DIVERGES).at(0, 0, row_sum),
@@ -353,6 +394,7 @@ fn number(field: Field) -> i32 {
         Field::Resolution => BLIK_FIELD_RESOLUTION,
         Field::Direction => BLIK_FIELD_DIRECTION,
         Field::Rows => BLIK_FIELD_ROWS,
+        Field::MaxBounces => BLIK_FIELD_MAX_BOUNCES,
         _ => BLIK_FIELD_NONE,
     }
 }

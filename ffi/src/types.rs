@@ -96,6 +96,13 @@ pub struct blik_settings {
     pub all_irradiances: i32,
     /// Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
     pub directional: i32,
+    /// Not 0: where the caller's memory is too small for the rows, their rays are halved until it is not; what that costs
+    /// is in the report's error estimate. Default 0: the call is refused and tells the bytes that it would need.
+    pub fit_memory: i32,
+    /// Most rays that rows may send, those by way of mirrors not counted, but for 64 a row at least; 0 (default): as many
+    /// as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
+    /// goes on at a steady number of rays a second.
+    pub ray_budget: u64,
 }
 
 /// [`blik_sky`]: the same radiance from the whole sphere.
@@ -245,7 +252,10 @@ pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
 }
 
 /// Sets a struct's defaults; nothing where the pointer is null.
-unsafe fn set<T>(at: *mut T, value: T) {
+///
+/// # Safety
+/// `at` is null or points to memory for a T.
+pub(crate) unsafe fn set<T>(at: *mut T, value: T) {
     if !at.is_null() && at.is_aligned() {
         // SAFETY: by the caller's promise there is room for a T.
         unsafe { at.write(value) };
@@ -288,6 +298,8 @@ pub unsafe extern "C" fn blik_settings_init(settings: *mut blik_settings) {
         max_bounces: -1,
         all_irradiances: 0,
         directional: 1,
+        fit_memory: 0,
+        ray_budget: 0,
     };
     // SAFETY: by the caller's promise.
     unsafe { set(settings, value) };

@@ -333,7 +333,7 @@ pub unsafe extern "C" fn blik_image_rows(
     })
 }
 
-fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usize>, blik_error> {
+pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usize>, blik_error> {
     match first.checked_add(rows) {
         Some(end) if end <= all => Ok(first..end),
         _ => Err(blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_ROWS).at(0, 0, first as f64)),
@@ -364,7 +364,8 @@ pub unsafe extern "C" fn blik_radiance(
         runner.rows(out, bands, 1.0, |range, out| {
             let mut terms = Terms::ZERO;
             let own = (range.start..).zip(rays.iter().skip(range.start));
-            for (out, (index, ray)) in out.chunks_exact_mut(bands.max(1)).zip(own) {
+            for (n, (index, ray)) in own.enumerate() {
+                let Some(out) = out.get_mut(n * bands..(n + 1) * bands) else { break };
                 terms.clear(bands);
                 let ray = Ray {
                     origin: scene.to_scene(Vec3::from_array(ray.origin)),

@@ -41,9 +41,10 @@ pub fn differences(
 ) -> Result<(), Error> {
     let bands = system.shape.bands;
     check(out.len(), span(&range) * bands)?;
+    let mut checks = Checks::ZERO;
     for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
-        let sums = Checks::of(&row, system.light, radiance, bands);
-        out.iter_mut().zip(sums.0).for_each(|(o, [first, second, ..])| *o = first + second);
+        let sums = checks.of(&row, system.light, radiance, bands);
+        out.iter_mut().zip(sums).for_each(|(o, [first, second, ..])| *o = first + second);
     }
     Ok(())
 }
@@ -93,11 +94,12 @@ pub fn rows(
 ) -> Result<(), Error> {
     check(out.len(), span(&range))?;
     let bands = system.shape.bands;
+    let mut checks = Checks::ZERO;
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
-        let sums = Checks::of(&row, system.light, radiance, bands);
+        let sums = checks.of(&row, system.light, radiance, bands);
         let carried = carried.get(unknown * bands..).unwrap_or(&[]);
         let mut largest: f64 = 0.0;
-        for (([first, second, one, other], carried), reference) in sums.0.iter().zip(carried).zip(reference) {
+        for (([first, second, one, other], carried), reference) in sums.iter().zip(carried).zip(reference) {
             if *reference > 0.0 {
                 let noise = LINEAR * (first * first + second * second) + carried * carried;
                 largest =
@@ -117,12 +119,16 @@ fn check(given: usize, expected: usize) -> Result<(), Error> {
 struct Checks([[f64; 4]; MAX_BANDS]);
 
 impl Checks {
-    fn of(row: &RowView<'_>, light: &Light<'_>, radiance: &[f64], bands: usize) -> Checks {
-        let mut checks = Checks([[0.0; 4]; MAX_BANDS]);
-        let sums = checks.0.head_mut(bands);
+    const ZERO: Checks = Checks([[0.0; 4]; MAX_BANDS]);
+
+    /// Those of a row: in place, as they are large.
+    #[inline(always)]
+    fn of(&mut self, row: &RowView<'_>, light: &Light<'_>, radiance: &[f64], bands: usize) -> &[[f64; 4]] {
+        let sums = self.0.head_mut(bands);
+        sums.fill([0.0; 4]);
         add_targets(row, radiance, sums);
         add_sky(row, light, sums);
-        checks
+        sums
     }
 }
 

@@ -30,6 +30,24 @@ macro_rules! plain_struct {
 }
 pub(crate) use plain_struct;
 
+/// Defines a struct of arrays of numbers that is plain, too large for [`plain_struct`]'s default value.
+macro_rules! plain_table {
+    ($(#[$meta:meta])* pub struct $name:ident { $($(#[$field_meta:meta])* pub $field:ident: $t:ty,)* }) => {
+        $(#[$meta])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct $name { $($(#[$field_meta])* pub $field: $t,)* }
+        const _: () = {
+            const fn plain<T: $crate::arena::Plain>() -> usize { size_of::<T>() }
+            assert!(size_of::<$name>() == 0 $(+ plain::<$t>())*, "no padding");
+        };
+        // SAFETY: all fields are plain, and there is no padding between or after them (both checked above).
+        #[allow(unsafe_code)]
+        unsafe impl $crate::arena::Plain for $name {}
+    };
+}
+pub(crate) use plain_table;
+
 macro_rules! plain {
     ($($t:ty),*) => { $(
         // SAFETY: a number, or a vector of them, has no padding and any bit pattern is one.

@@ -51,10 +51,14 @@ impl BeamSettings {
     }
 }
 
-/// The most rays of one row, and so about half the records that it may need while it grows.
-pub fn most_rays(scene: &Scene<'_>, settings: &BeamSettings) -> usize {
+/// Records of a row at which those of the same element are added up for the first time.
+const FOLD: usize = 1024;
+
+/// About the records that one row needs while it grows: two for each ray, or twice as many as there are different ones.
+pub fn unmerged(scene: &Scene<'_>, elements: &Elements<'_>, settings: &BeamSettings) -> usize {
     let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
-    (clamp(largest * settings.density, RAYS.0, RAYS.1) as usize).next_power_of_two()
+    let rays = (clamp(largest * settings.density, RAYS.0, RAYS.1) as usize).next_power_of_two();
+    (2 * rays).min(FOLD + elements.unknowns().saturating_mul(8))
 }
 
 /// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
@@ -113,8 +117,12 @@ impl Tracer<'_, '_> {
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
+        let mut fold = FOLD;
         for index in 0..rays {
             self.ray(facet, side, &sequence, index, &mut stats)?;
+            if self.sink.present() >= fold {
+                fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
+            }
         }
         let share = 1.0 / f64::from(rays);
         let finish = |record: Record| Some(Record { weight: share * record.weight, ..record });

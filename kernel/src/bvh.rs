@@ -1,4 +1,4 @@
-//! The bounding volume hierarchy: nodes of eight boxes, leaves of four facets, in caller memory.
+//! The bounding volume hierarchy: nodes of eight boxes, packets of eight facets, in caller memory.
 //!
 //! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
 //! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least
@@ -11,6 +11,7 @@ mod collapse;
 mod external;
 #[cfg(feature = "std")]
 mod obvhs;
+mod stream;
 mod traverse;
 
 use crate::arena::{Arena, Need};
@@ -23,14 +24,21 @@ use crate::simd::Isa;
 use build::{Binary, Facets};
 use external::External;
 
-pub use external::Intersector;
+pub use external::{Ahead, BATCH, Intersector, NO_FACET};
+pub(crate) use stream::GROUP;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.
 type Boxes = [[[f32; 8]; 2]; 3];
 
-/// Four facets: corner 0, 1, 2 and the normal, then axis, then facet.
-type Packet = [[[f64; 4]; 3]; 4];
+/// Eight facets in f32: corner, then axis, then facet.
+type Packet = [[[f32; 8]; 3]; 3];
+
+/// How far the edge functions of each facet of a packet can be off in f32, in units of the error of an image.
+type Slack = [f32; 8];
+
+/// One facet: its corners and normal.
+type Solid = [[f64; 3]; 4];
 
 /// A child with this bit is a leaf: the packet's index, and [`PAIR`] where the leaf goes on in the next packet.
 const LEAF: u32 = 1 << 31;
@@ -40,7 +48,7 @@ const PAIR: u32 = 1 << 30;
 const NONE: u32 = u32::MAX;
 
 /// Facets a leaf holds at most, and the width of a packet.
-const LANES: usize = 4;
+const LANES: usize = 8;
 
 /// Entries of a stack that the deepest tree needs: seven for each of at most 69 levels, and one.
 const STACK: usize = 512;
@@ -62,7 +70,10 @@ pub struct Bvh<'m> {
     boxes: &'m [Boxes],
     children: &'m [[u32; 8]],
     packets: &'m [Packet],
+    slacks: &'m [Slack],
     facets: &'m [[u32; LANES]],
+    /// By facet.
+    solids: &'m [Solid],
     /// Levels of nodes: bounds the stack of a traversal.
     levels: usize,
     low: Vec3,
@@ -77,7 +88,7 @@ pub struct Bvh<'m> {
 struct Size {
     nodes: usize,
     packets: usize,
-    /// Bytes that first hold the binary tree and then the packets.
+    /// Bytes that first hold the binary tree and then the facets.
     shared: usize,
 }
 
@@ -86,14 +97,14 @@ impl Size {
         if facets >= MOST {
             return Err(Error::TooMany { what: "facets", limit: MOST - 1 });
         }
-        // A node of fewer than eight children has leaves alone and at least five facets (smaller subtrees become
+        // A node of fewer than eight children has leaves alone and at least nine facets (smaller subtrees become
         // one leaf). Let w of N nodes be such. Nodes other than the root, and leaves outside the w, are children of
-        // the N - w full nodes: 8 (N - w) = N - 1 + l with 5 w + l <= n, hence N <= (n + 3 w)/7 <= 8 n/35.
-        let nodes = facets * 8 / 35 + 2;
-        // Leaves start on a packet's boundary as long as that leaves at most n/2 lanes empty.
-        let packets = (facets + facets / 2).div_ceil(LANES);
+        // the N - w full nodes: 8 (N - w) = N - 1 + l with 9 w + l <= n, hence N < n/7; but the root may be alone.
+        let nodes = facets / 7 + 2;
+        // Leaves start on a packet's boundary as long as that leaves at most as many lanes empty as are filled.
+        let packets = (2 * facets).div_ceil(LANES);
         let tree = Binary::need(facets).bytes()?;
-        let shared = tree.max(Need::new().and::<Packet>(packets).bytes()?);
+        let shared = tree.max(Need::new().and::<Solid>(facets).bytes()?);
         Ok(Size { nodes, packets, shared })
     }
 
@@ -102,6 +113,8 @@ impl Size {
             .and::<Boxes>(self.nodes)
             .and::<[u32; 8]>(self.nodes)
             .and::<[u32; LANES]>(self.packets)
+            .and::<Packet>(self.packets)
+            .and::<Slack>(self.packets)
             .and::<u8>(self.shared)
             .bytes()
     }
@@ -162,6 +175,8 @@ impl<'m> Bvh<'m> {
         let boxes = arena.take::<Boxes>(size.nodes)?;
         let children = arena.take::<[u32; 8]>(size.nodes)?;
         let facets = arena.take::<[u32; LANES]>(size.packets)?;
+        let packets = arena.take::<Packet>(size.packets)?;
+        let slacks = arena.take::<Slack>(size.packets)?;
         let shared = arena.take::<u8>(size.shared)?;
         let made = {
             let mut scratch = Arena::new(&mut *shared, size.shared)?;
@@ -169,17 +184,23 @@ impl<'m> Bvh<'m> {
             builder(&prepared, &mut tree);
             collapse::collapse(&tree, boxes, children, facets)
         };
-        let facets = facets.head(made.packets);
-        let packets = Arena::new(shared, 0)?.take::<Packet>(facets.len())?;
-        for (packet, lanes) in packets.iter_mut().zip(facets) {
-            fill(packet, lanes, corners);
+        let (facets, packets) = (facets.head(made.packets), packets.head_mut(made.packets));
+        let slacks = slacks.head_mut(made.packets);
+        for ((packet, slack), lanes) in packets.iter_mut().zip(&mut *slacks).zip(facets) {
+            (*packet, *slack) = packed(lanes, corners);
+        }
+        let solids = Arena::new(shared, 0)?.take::<Solid>(corners.len())?;
+        for (place, facet) in solids.iter_mut().zip(corners) {
+            *place = solid(facet);
         }
         let (boxes, children) = (boxes.head(made.nodes), children.head(made.nodes));
         Ok(Bvh {
             boxes,
             children,
             packets,
+            slacks,
             facets,
+            solids,
             levels: made.levels,
             low,
             high,
@@ -208,8 +229,25 @@ impl<'m> Bvh<'m> {
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
         match &self.external {
-            Some(external) => external.tracer.any(ray),
+            Some(external) => external.any(ray),
             None => traverse::occluded(self, ray),
+        }
+    }
+
+    /// [`closest`](Bvh::closest) of each ray: the same hits, sooner where rays that follow each other start near each
+    /// other. Of slices of different lengths, what the shorter one has.
+    pub fn closest_many(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        match &self.external {
+            Some(external) => external.closest_many(self, rays, hits),
+            None => stream::closest(self, rays, hits),
+        }
+    }
+
+    /// [`occluded`](Bvh::occluded) of each ray; as [`Bvh::closest_many`].
+    pub fn occluded_many(&self, rays: &[Ray], occluded: &mut [bool]) {
+        match &self.external {
+            Some(external) => external.any_many(rays, occluded),
+            None => stream::occluded(self, rays, occluded),
         }
     }
 
@@ -224,12 +262,20 @@ impl<'m> Bvh<'m> {
         (self.low, self.high)
     }
 
+    /// One packet with its slacks and facets.
+    #[inline(always)]
+    fn lanes(&self, packet: usize) -> Option<(&Packet, &Slack, &[u32; LANES])> {
+        Some((self.packets.get(packet)?, self.slacks.get(packet)?, self.facets.get(packet)?))
+    }
+
     /// Bytes in use once built, at most [`Bvh::bytes`].
     pub fn memory(&self) -> usize {
         size_of_val(self.boxes)
             + size_of_val(self.children)
             + size_of_val(self.facets)
             + size_of_val(self.packets)
+            + size_of_val(self.slacks)
+            + size_of_val(self.solids)
     }
 }
 
@@ -247,17 +293,26 @@ fn extent(corners: &[[Vec3; 3]], areas: &[f64]) -> Result<(Vec3, Vec3), Error> {
     if low.abs().max(high.abs()).max_element() < SMALLEST { Err(Error::Extent) } else { Ok((low, high)) }
 }
 
-/// Copies the facets of one packet, with their normals, into its lanes. Lanes without a facet are NaN, which is
-/// inside of nothing.
-fn fill(packet: &mut Packet, lanes: &[u32; LANES], corners: &[[Vec3; 3]]) {
-    *packet = [[[f64::NAN; LANES]; 3]; 4];
+/// The facets of one packet in f32, and their slacks. Lanes without a facet are NaN, which is inside of nothing.
+fn packed(lanes: &[u32; LANES], corners: &[[Vec3; 3]]) -> (Packet, Slack) {
+    let mut packet = [[[f32::NAN; LANES]; 3]; 3];
+    let mut slack = [f32::NAN; LANES];
     for (lane, &facet) in lanes.iter().enumerate() {
         let Some(facet) = corners.get(facet as usize) else { continue };
         let [a, b, c] = *facet;
-        for (rows, vector) in packet.iter_mut().zip([a, b, c, ray::normal(facet)]) {
+        for (rows, vector) in packet.iter_mut().zip(facet) {
             for (row, x) in rows.iter_mut().zip(vector.to_array()) {
-                row.set(lane, x);
+                row.set(lane, x as f32);
             }
         }
+        let extent = (a.max(b).max(c) - a.min(b).min(c)).max_element();
+        slack.set(lane, (extent * traverse::SLACK) as f32);
     }
+    (packet, slack)
+}
+
+/// A facet with its normal.
+fn solid(facet: &[Vec3; 3]) -> Solid {
+    let [a, b, c] = *facet;
+    [a, b, c, ray::normal(facet)].map(|vector| vector.to_array())
 }

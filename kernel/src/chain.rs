@@ -3,14 +3,15 @@
 
 mod sunlight;
 
+use crate::arena::plain_table;
 use crate::bvh::Bvh;
 use crate::element::Elements;
-use crate::index::{Index, IndexMut};
+use crate::index::{Index, IndexMut, copy};
 use crate::light::{Light, Shape};
 use crate::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::mirror::{Mirror, Surface};
 use crate::qmc::{Sequence, hash2};
-use crate::ray::Ray;
+use crate::ray::{Hit, Ray};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sun_image::SunImages;
 
@@ -52,15 +53,40 @@ pub struct Solved<'a> {
     pub settings: ChainSettings,
 }
 
-/// The three terms of eq. (11) along a ray, one value per band each.
-#[derive(Clone, Copy, Debug)]
-pub struct Terms {
-    /// Diffuse radiance of the first facet.
-    pub diffuse: [f64; MAX_BANDS],
-    /// Sky and sun by way of mirrors, or straight where the ray meets nothing.
-    pub mirror_sky: [f64; MAX_BANDS],
-    /// Diffuse radiance of other facets by way of mirrors.
-    pub mirror_diffuse: [f64; MAX_BANDS],
+plain_table! {
+    /// The three terms of eq. (11) along a ray, one value per band each.
+    pub struct Terms {
+        /// Diffuse radiance of the first facet.
+        pub diffuse: [f64; MAX_BANDS],
+        /// Sky and sun by way of mirrors, or straight where the ray meets nothing.
+        pub mirror_sky: [f64; MAX_BANDS],
+        /// Diffuse radiance of other facets by way of mirrors.
+        pub mirror_diffuse: [f64; MAX_BANDS],
+    }
+}
+
+plain_table! {
+    /// What a chain needs while it is followed, of any content: too large for small stacks.
+    pub struct Work {
+        /// Product of the reflectances along the chain, and along a ray of a lobe.
+        pub through: [[f64; MAX_BANDS]; 2],
+        /// Sums over a lobe's rays.
+        pub sums: Terms,
+        /// Sums of their squares.
+        pub squares: [f64; MAX_BANDS],
+        /// The sums before the latest ray.
+        pub before: [f64; MAX_BANDS],
+    }
+}
+
+impl Work {
+    /// All zero.
+    pub const ZERO: Work = Work {
+        through: [[0.0; MAX_BANDS]; 2],
+        sums: Terms::ZERO,
+        squares: [0.0; MAX_BANDS],
+        before: [0.0; MAX_BANDS],
+    };
 }
 
 impl Terms {
@@ -174,10 +200,10 @@ impl Sample {
 }
 
 /// A chain on its way.
-struct Leg {
+struct Leg<'w> {
     ray: Ray,
     /// Product of the mirror reflectances so far, per band.
-    through: [f64; MAX_BANDS],
+    through: &'w mut [f64; MAX_BANDS],
     /// Mirrors met.
     mirrors: u32,
     /// Lobes among them.
@@ -211,15 +237,18 @@ const MOST_LOBE_RAYS: f64 = 1024.0;
 const MOST_CLOSED: f64 = 0.5;
 
 /// The rays of one lobe so far: sums over them.
-struct Fan {
-    terms: Terms,
+struct Fan<'w> {
+    terms: &'w mut Terms,
     path: Path,
     /// Sum of the squared radiances of each band.
-    squares: [f64; MAX_BANDS],
+    squares: &'w mut [f64; MAX_BANDS],
+    before: &'w mut [f64; MAX_BANDS],
+    /// Product of the reflectances along the latest ray.
+    through: &'w mut [f64; MAX_BANDS],
     count: u32,
 }
 
-impl Fan {
+impl Fan<'_> {
     /// Standard deviation of a ray's radiance over the reference radiance, the largest of all bands.
     fn spread(&self, reference: &[f64]) -> f64 {
         let n = f64::from(self.count.max(1));
@@ -262,23 +291,44 @@ impl Fan {
 impl Solved<'_> {
     /// Radiance against `ray`, added to `terms` (cleared by the caller).
     pub fn radiance(&self, ray: &Ray, sample: Sample, terms: &mut Terms) -> Path {
+        self.radiance_at((ray, self.bvh.closest(ray)), sample, terms, &mut { Work::ZERO })
+    }
+
+    /// The same of a ray that is known to meet `hit` first, in the caller's memory.
+    pub fn radiance_at(
+        &self,
+        (ray, hit): (&Ray, Option<Hit>),
+        sample: Sample,
+        terms: &mut Terms,
+        work: &mut Work,
+    ) -> Path {
         let mut path = Path::default();
-        let bands = self.shape.bands;
-        let mut leg = Leg { ray: *ray, through: [0.0; MAX_BANDS], mirrors: 0, lobes: 0, lobe: false };
-        leg.through.head_mut(bands).fill(1.0);
-        self.follow(leg, sample, terms, &mut path);
+        let Work { through: [through, next], sums, squares, before } = work;
+        through.head_mut(self.shape.bands).fill(1.0);
+        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false };
+        let mut fan = Fan { terms: sums, path, squares, before, through: next, count: 0 };
+        self.follow(leg, hit, sample, terms, &mut path, Some(&mut fan));
         path
     }
 
-    /// Follows a chain to its end; the first lobe branches where the ray stands for itself, all others take one ray.
-    fn follow(&self, mut leg: Leg, sample: Sample, terms: &mut Terms, path: &mut Path) {
+    /// Follows a chain whose ray meets `hit` first to its end; the first lobe branches into `fan` where the ray stands for
+    /// itself, all others take one ray.
+    fn follow(
+        &self,
+        mut leg: Leg<'_>,
+        mut hit: Option<Hit>,
+        sample: Sample,
+        terms: &mut Terms,
+        path: &mut Path,
+        mut fan: Option<&mut Fan<'_>>,
+    ) {
         loop {
-            let Some(hit) = self.bvh.closest(&leg.ray) else {
+            let Some(met) = hit else {
                 self.escape(&leg, terms);
                 return;
             };
             path.object |= leg.mirrors == 0;
-            let Some(surface) = Surface::of_hit(self.scene, &hit) else { return };
+            let Some(surface) = Surface::of_hit(self.scene, &met) else { return };
             self.add_diffuse(&leg, &surface, sample, terms, path);
             let Some(mirror) = surface.mirror(self.scene) else { return };
             if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
@@ -310,8 +360,11 @@ impl Solved<'_> {
                     leg.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
-                    if leg.lobes == 1 && (asked || matches!(sample, Sample::Alone(_))) {
-                        self.branch(&leg, &surface, &mirror, sample, terms, path);
+                    if leg.lobes == 1
+                        && (asked || matches!(sample, Sample::Alone(_)))
+                        && let Some(fan) = fan.take()
+                    {
+                        self.branch(&mut leg, (&surface, &mirror), sample, terms, path, fan);
                         return;
                     }
                     let (u, v) = sample.lobe_point(leg.lobes);
@@ -319,6 +372,7 @@ impl Solved<'_> {
                 }
             }
             path.rays += 1;
+            hit = self.bvh.closest(&leg.ray);
         }
     }
 
@@ -339,7 +393,7 @@ impl Solved<'_> {
     }
 
     /// One ray of a lobe, weighed with the lobe's albedo.
-    fn turn(&self, leg: &mut Leg, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
+    fn turn(&self, leg: &mut Leg<'_>, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
         let (direction, share) = surface.go_on(self.scene, mirror, leg.ray.direction, u, v);
         leg.through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
         leg.ray = surface.leave(direction);
@@ -347,33 +401,34 @@ impl Solved<'_> {
 
     /// Equal-energy rays of the visible lobe: as many as its material asks for; or a first set by the tolerance and,
     /// where its rays disagree, a second.
+    #[inline(never)]
     fn branch(
         &self,
-        leg: &Leg,
-        surface: &Surface,
-        mirror: &Mirror,
+        leg: &mut Leg<'_>,
+        (surface, mirror): (&Surface, &Mirror),
         sample: Sample,
         terms: &mut Terms,
         path: &mut Path,
+        fan: &mut Fan<'_>,
     ) {
         let Some(lobe) = &mirror.lobe else { return };
         let bands = self.shape.bands;
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
         let albedo = lobe.albedo(mirrored.dot(surface.normal));
-        let mut through = leg.through;
-        through.head_mut(bands).iter_mut().for_each(|t| *t *= albedo);
-        let largest = through.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
+        leg.through.head_mut(bands).iter_mut().for_each(|t| *t *= albedo);
+        let largest = leg.through.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
 
         let asked = self.scene.gloss_rays(surface.material);
         let mut goal = asked.unwrap_or_else(|| self.first_rays(largest));
-        let mut fan = Fan { terms: Terms::ZERO, path: Path::default(), squares: [0.0; MAX_BANDS], count: 0 };
+        fan.terms.clear(bands);
+        fan.squares.head_mut(bands).fill(0.0);
         for set in 0..2 {
             let n = goal.saturating_sub(fan.count);
             let turn = sample.turn(set);
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
                 let ray = surface.leave(direction);
-                self.add_ray(Leg { ray, through, lobe: true, ..*leg }, sample, &mut fan);
+                self.add_ray(leg, &ray, sample, fan);
             }
             if asked.is_none() {
                 goal = self.all_rays(fan.spread(self.reference));
@@ -396,28 +451,31 @@ impl Solved<'_> {
         wanted.min(MOST_LOBE_RAYS) as u32
     }
 
-    /// One more ray of a lobe, to its end.
-    fn add_ray(&self, leg: Leg, sample: Sample, fan: &mut Fan) {
+    /// One more ray of the lobe that `leg` has met, to its end.
+    fn add_ray(&self, leg: &Leg<'_>, ray: &Ray, sample: Sample, fan: &mut Fan<'_>) {
         let bands = self.shape.bands;
-        let mut before = [0.0; MAX_BANDS];
-        before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = fan.terms.sum(b));
-        fan.path.rays += 1;
-        let of = Sample::OneOf { seed: sample.seed(), index: fan.count };
-        self.follow(leg, of, &mut fan.terms, &mut fan.path);
-        for (b, (square, before)) in fan.squares.iter_mut().zip(before).enumerate().take(bands) {
-            let value = fan.terms.sum(b) - before;
+        let Fan { terms, path, squares, before, through, count } = fan;
+        before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = terms.sum(b));
+        copy(through.head_mut(bands), leg.through.head(bands));
+        path.rays += 1;
+        let of = Sample::OneOf { seed: sample.seed(), index: *count };
+        let hit = self.bvh.closest(ray);
+        let leg = Leg { ray: *ray, through, mirrors: leg.mirrors, lobes: leg.lobes, lobe: true };
+        self.follow(leg, hit, of, terms, path, None);
+        for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
+            let value = terms.sum(b) - before;
             *square += value * value;
         }
-        fan.count += 1;
+        *count += 1;
     }
 
     /// The chain leaves the object: sky, and the sun's disc.
-    fn escape(&self, leg: &Leg, terms: &mut Terms) {
+    fn escape(&self, leg: &Leg<'_>, terms: &mut Terms) {
         let bands = self.shape.bands;
         if let Some(sky) = &self.light.sky {
             let mut radiance = [0.0; MAX_BANDS];
             sky.radiance(leg.ray.direction, radiance.head_mut(bands));
-            let own = radiance.iter().zip(&leg.through).take(bands);
+            let own = radiance.iter().zip(leg.through.iter()).take(bands);
             terms.mirror_sky.iter_mut().zip(own).for_each(|(to, (l, through))| *to += through * l);
         }
         if let Some(sun) = &self.light.sun
@@ -425,18 +483,28 @@ impl Solved<'_> {
             && !leg.lobe
             && sun.contains(leg.ray.direction)
         {
-            let own = terms.mirror_sky.iter_mut().zip(&leg.through).take(bands);
+            let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(bands);
             own.enumerate().for_each(|(band, (to, through))| *to += through * sun.disc_radiance(band));
         }
     }
 
     /// Diffuse radiance of a facet toward the chain.
     #[inline]
-    fn add_diffuse(&self, leg: &Leg, surface: &Surface, sample: Sample, terms: &mut Terms, path: &mut Path) {
+    fn add_diffuse(
+        &self,
+        leg: &Leg<'_>,
+        surface: &Surface,
+        sample: Sample,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
         let bands = self.shape.bands;
         let to = if leg.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
         let emission = self.scene.emission(surface.material);
-        to.iter_mut().zip(&leg.through).zip(emission).for_each(|((to, through), own)| *to += through * own);
+        to.iter_mut()
+            .zip(leg.through.iter())
+            .zip(emission)
+            .for_each(|((to, through), own)| *to += through * own);
         let diffuse = self.scene.diffuse(surface.material);
         let level = match self.settings.max_bounces {
             Some(most) if leg.mirrors >= most => return,
@@ -454,7 +522,7 @@ impl Solved<'_> {
             self.add_images(leg, surface, sample, to, path);
         }
         let mut weight = 0.0;
-        for (band, ((to, through), rho)) in to.iter_mut().zip(&leg.through).zip(diffuse).enumerate() {
+        for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
             let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
             let mut irradiance = smooth.max(0.0);
             if sunlit > 0.0

@@ -145,6 +145,7 @@ impl<'m> Elements<'m> {
     /// were cut into, some thirty at most.
     pub fn neighbours(&self, unknown: usize) -> impl Iterator<Item = usize> {
         let (sides, facet) = (self.sides.max(1), self.facet_of(unknown).0);
+        let side = unknown % sides;
         let own = Path(self.path.at(unknown / sides));
         let (start, end) = (self.first.at(facet) as usize, self.first.at(facet + 1) as usize);
         let at = unknown / sides;
@@ -152,7 +153,7 @@ impl<'m> Elements<'m> {
             .flat_map(move |step| [at.checked_sub(step), at.checked_add(step)])
             .flatten()
             .filter(move |e| (start..end).contains(e) && own.is_quarter_beside(Path(self.path.at(*e))))
-            .map(move |e| e * sides + unknown % sides)
+            .map(move |e| e * sides + side)
     }
 
     /// Share of its facet's area that an unknown's element has.

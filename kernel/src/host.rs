@@ -5,8 +5,10 @@
 //! [`Host::signature`] for each view. A new light traces no visibility rays, a new view solves nothing.
 
 mod report;
+mod rounds;
 
 pub use report::*;
+pub use rounds::Rounds;
 
 use crate::accuracy;
 use crate::arena::Memory;
@@ -170,7 +172,7 @@ impl Host {
         report.bytes.scene = scene.memory();
         report.seconds.scene = clock.lap();
         *bvh_memory = Memory::new(Bvh::bytes(scene.facets())?);
-        let bvh = Bvh::build_obvhs(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
+        let bvh = Bvh::build(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
         report.bytes.bvh = bvh.memory();
         report.seconds.bvh = clock.lap();
         let rows = RowSettings::new(

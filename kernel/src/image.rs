@@ -2,9 +2,10 @@
 
 mod lines;
 
-use crate::arena::{Arena, Need};
+use crate::arena::{Arena, Need, plain_table};
+use crate::bvh::Ahead;
 use crate::camera::{Camera, Sampling};
-use crate::chain::{Sample, Solved, Terms};
+use crate::chain::{Sample, Solved, Terms, Work};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy};
 use crate::math::{clamp, floor, pow, sqrt};
@@ -35,10 +36,12 @@ pub struct Tally {
 impl Tally {
     /// Adds the tally of the next range.
     pub fn add(&mut self, next: &Tally) {
-        self.object_pixels += next.object_pixels;
-        self.primary += next.primary;
-        self.chain += next.chain;
-        self.refined += next.refined;
+        // a caller may hand over any numbers
+        let add = |to: &mut u64, more: u64| *to = to.saturating_add(more);
+        add(&mut self.object_pixels, next.object_pixels);
+        add(&mut self.primary, next.primary);
+        add(&mut self.chain, next.chain);
+        add(&mut self.refined, next.refined);
         self.noise2 += next.noise2;
         self.sampling2 += next.sampling2;
         self.tail = self.tail.max(next.tail);
@@ -65,7 +68,7 @@ pub struct Target<'o> {
 /// Bytes of scratch memory for [`rows`]: three rows of pixel centres, and what integrals over a pixel hold.
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let centres = 3 * (camera.columns() + 2) * (3 * bands + NOTES);
-    Need::new().and::<f64>(centres).and::<f64>(work(bands)).bytes()
+    Need::new().and::<f64>(centres).and::<f64>(work(bands)).and::<Board>(1).bytes()
 }
 
 /// Values of two nested integrals and the result.
@@ -155,8 +158,9 @@ pub fn rows(
     let stride = 3 * bands + NOTES;
     let lines = arena.take::<f64>(3 * width * stride)?;
     let work = arena.take::<f64>(work(bands))?;
-    let (terms, tally) = (Terms::ZERO, Tally::default());
-    let mut painter = Painter { solved, camera, lines, work, width, stride, terms, tally };
+    let board = arena.take::<Board>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+    let tally = Tally::default();
+    let mut painter = Painter { solved, camera, lines, work, width, stride, board, tally };
     match camera.sampling() {
         Sampling::Centre => painter.centres(range, target),
         Sampling::Area => painter.areas(range, target),
@@ -167,6 +171,20 @@ pub fn rows(
 /// How far from a pixel's edges its rays stay, in pixels.
 const EDGE: f64 = 1e-6;
 
+plain_table! {
+    /// A ray's terms and what following it takes, and the sums over scattered rays.
+    pub struct Board {
+        /// Of the latest ray.
+        pub terms: Terms,
+        /// While it is followed.
+        pub work: Work,
+        /// Sums over rays.
+        pub sums: Terms,
+        /// Sums of squares.
+        pub squares: [f64; MAX_BANDS],
+    }
+}
+
 struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
     camera: &'a Camera,
@@ -175,7 +193,7 @@ struct Painter<'a, 's> {
     work: &'s mut [f64],
     width: usize,
     stride: usize,
-    terms: Terms,
+    board: &'s mut Board,
     tally: Tally,
 }
 
@@ -261,22 +279,30 @@ impl<'a> Painter<'a, '_> {
     /// Computes the centres of a row.
     fn line(&mut self, row: isize, columns: Range<isize>) {
         let bands = self.solved.shape.bands;
-        for j in columns {
+        let mut ahead = Ahead::default();
+        let (start, count) = (columns.start, columns.end.saturating_sub(columns.start) as u32);
+        for (n, j) in columns.enumerate() {
             let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
-            self.terms.clear(bands);
+            let (camera, n) = (&self.camera, n as u32);
+            let any = |m: u32| {
+                if m == n { ray } else { camera.ray((start + m as isize) as f64 + 0.5, row as f64 + 0.5) }
+            };
+            let hit = self.solved.bvh.closest_of(&mut ahead, n, count, any);
+            self.board.terms.clear(bands);
             let seed = hash2(row as u32, j as u32);
             let sample = match self.camera.sampling() {
                 Sampling::Centre => Sample::Alone(seed),
                 Sampling::Area => Sample::Glance(seed),
             };
-            let path = self.solved.radiance(&ray, sample, &mut self.terms);
+            let path =
+                self.solved.radiance_at((&ray, hit), sample, &mut self.board.terms, &mut self.board.work);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let at = self.slot(row, j);
             let slot = self.lines.part_mut(at..at + self.stride);
-            copy(slot.part_mut(0..bands), &self.terms.diffuse);
-            copy(slot.part_mut(bands..2 * bands), &self.terms.mirror_sky);
-            copy(slot.part_mut(2 * bands..3 * bands), &self.terms.mirror_diffuse);
+            copy(slot.part_mut(0..bands), &self.board.terms.diffuse);
+            copy(slot.part_mut(bands..2 * bands), &self.board.terms.mirror_sky);
+            copy(slot.part_mut(2 * bands..3 * bands), &self.board.terms.mirror_diffuse);
             let variance = path.variance + path.noise * path.noise;
             let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
             copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, variance, path.tail, sampled, 0.0]);
@@ -362,7 +388,8 @@ impl<'a> Painter<'a, '_> {
     ) -> Option<f64> {
         let (solved, camera, measure) = (self.solved, self.camera, self.measure());
         let stride = measure.stride();
-        let Painter { work, terms, tally, .. } = self;
+        let Painter { work, board, tally, .. } = self;
+        let (terms, chain) = (&mut board.terms, &mut board.work);
         let (outer, rest) = work.split_at_mut_checked(lines::memory(stride))?;
         let (inner, out) = rest.split_at_mut_checked(lines::memory(stride))?;
         let seed = hash2(row as u32, column as u32);
@@ -382,7 +409,8 @@ impl<'a> Painter<'a, '_> {
                 let (x, y) = if along { (x, y) } else { (y, x) };
                 let ray = camera.ray(column as f64 + x, row as f64 + y);
                 terms.clear(measure.bands);
-                let path = solved.radiance(&ray, Sample::Glance(seed), terms);
+                let hit = solved.bvh.closest(&ray);
+                let path = solved.radiance_at((&ray, hit), Sample::Glance(seed), terms, chain);
                 tally.primary += 1;
                 tally.chain += u64::from(path.rays);
                 let (diffuse, rest) = slot.split_at_mut_checked(measure.bands)?;
@@ -396,15 +424,23 @@ impl<'a> Painter<'a, '_> {
         let places = [0.0, 0.25, 0.5, 0.75, 1.0];
         let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
-        self.put(target, index, 1.0, |this, i| this.work.at(2 * lines::memory(stride) + i));
+        self.put(target, index, 1.0, |this, term, band| {
+            this.work.at(2 * lines::memory(stride) + term * measure.bands + band)
+        });
         Some(LINES * sqrt(error2))
     }
 
-    /// Writes a pixel's terms, numbered by band within each term, times `share`.
-    fn put(&self, target: &mut Target<'_>, index: usize, share: f64, of: impl Fn(&Self, usize) -> f64) {
+    /// Writes a pixel's terms, `of` term and band, times `share`.
+    fn put(
+        &self,
+        target: &mut Target<'_>,
+        index: usize,
+        share: f64,
+        of: impl Fn(&Self, usize, usize) -> f64,
+    ) {
         let bands = self.solved.shape.bands;
         for band in 0..bands {
-            let terms = [0, 1, 2].map(|term| of(self, term * bands + band));
+            let terms = [0, 1, 2].map(|term| of(self, term, band));
             target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
             for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
                 component.set(index * bands + band, (term * share) as f32);
@@ -424,20 +460,27 @@ impl<'a> Painter<'a, '_> {
         let bands = self.solved.shape.bands;
         let seed = hash2(row as u32, column as u32);
         let sequence = Sequence::new(seed);
-        let mut sums = Terms::ZERO;
-        let mut squares = [0.0; MAX_BANDS];
+        self.board.sums.clear(bands);
+        self.board.squares.head_mut(bands).fill(0.0);
         let (mut n, mut goal) = (0u32, FEWEST);
-        let mut error = 0.0;
+        let (mut error, mut ahead) = (0.0, Ahead::default());
         while n < goal {
-            let (x, y) = sequence.pair(n, 0);
-            let ray = self.camera.ray(column as f64 + x, row as f64 + y);
-            self.terms.clear(bands);
-            let path = self.solved.radiance(&ray, Sample::OneOf { seed, index: n }, &mut self.terms);
+            let camera = &self.camera;
+            let any = |n: u32| {
+                let (x, y) = sequence.pair(n, 0);
+                camera.ray(column as f64 + x, row as f64 + y)
+            };
+            let ray = any(n);
+            let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
+            self.board.terms.clear(bands);
+            let of = Sample::OneOf { seed, index: n };
+            let path = self.solved.radiance_at((&ray, hit), of, &mut self.board.terms, &mut self.board.work);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
-            sums.add(&self.terms, bands);
+            let Board { terms, sums, squares, .. } = &mut *self.board;
+            sums.add(terms, bands);
             for (band, square) in squares.iter_mut().enumerate().take(bands) {
-                *square += self.terms.sum(band) * self.terms.sum(band);
+                *square += terms.sum(band) * terms.sum(band);
             }
             n += 1;
             if n == goal {
@@ -458,11 +501,10 @@ impl<'a> Painter<'a, '_> {
                 }
             }
         }
-        let bands = self.solved.shape.bands;
-        self.put(target, index, 1.0 / f64::from(n), |_, i| {
-            [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse]
-                .get(i / bands)
-                .map_or(0.0, |t| t.at(i % bands))
+        self.put(target, index, 1.0 / f64::from(n), |this, term, band| {
+            let sums = &this.board.sums;
+            let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
+            all.get(term).map_or(0.0, |values| values.at(band))
         });
         error
     }

@@ -98,6 +98,16 @@ impl<'a, T> Iterator for Pieces<'a, T> {
     }
 }
 
+/// The same to read, as of `chunks_exact`.
+#[inline(always)]
+pub(crate) fn parts<T>(mut values: &[T], size: usize) -> impl Iterator<Item = &[T]> {
+    core::iter::from_fn(move || {
+        let (part, rest) = values.split_at_checked(size)?;
+        values = rest;
+        (size > 0).then_some(part)
+    })
+}
+
 /// Copies as many values as both have.
 #[inline(always)]
 pub(crate) fn copy<T: Copy>(to: &mut [T], from: &[T]) {

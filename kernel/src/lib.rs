@@ -76,6 +76,7 @@ pub mod form_factor;
 pub mod host;
 pub mod image;
 mod index;
+mod inside;
 pub mod light;
 pub mod lobe;
 pub mod math;

@@ -3,7 +3,7 @@
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
 
-use crate::bvh::Bvh;
+use crate::bvh::{Ahead, Bvh};
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
@@ -222,19 +222,23 @@ pub fn sun_rows(
         }
         let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
         let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
-        while count < goal {
-            let (p, q) = sequence.pair(count, 0);
+        let mut ahead = Ahead::default();
+        let leave = |n| {
+            let (p, q) = sequence.pair(n, 0);
             let (a, b) = triangle(p, q);
             let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
-            let (s, t) = sequence.pair(count, 2);
-            let toward = sun.sample(s, t);
-            let surface = Surface::new(scene, facet, side, u, v);
-            let share = sun.share(toward, normal);
-            count += 1;
+            let (s, t) = sequence.pair(n, 2);
+            Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t))
+        };
+        while count < goal {
+            let ray = leave(count);
+            let share = sun.share(ray.direction, normal);
             if share > 0.0 {
                 all += share;
-                lit += if bvh.occluded(&surface.leave(toward)) { 0.0 } else { share };
+                let any = |n| if n == count { ray } else { leave(n) };
+                lit += if bvh.occluded_of(&mut ahead, count, goal, any) { 0.0 } else { share };
             }
+            count += 1;
             if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
                 goal = SUN_POINTS.1;
             }

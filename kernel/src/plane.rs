@@ -25,6 +25,7 @@ pub mod light;
 pub mod lobe;
 pub mod rows;
 pub mod scene;
+pub mod settings;
 pub mod solve;
 pub mod stencil;
 pub mod trace;

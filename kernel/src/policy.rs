@@ -223,3 +223,20 @@ pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
     let largest = parts.iter().fold((Limit::Nothing, 0.0), |a, &b| if b.1 > a.1 { b } else { a });
     (sqrt(sum), largest.0)
 }
+
+/// Estimates up to so many tolerances are let pass: on the calibration's scenes they are about twice the error.
+const PASSES: f64 = 2.0;
+
+/// The most rounds of one image, and the most and the least by which the tolerance falls from one to the next: half of it
+/// takes some four times as long.
+const ROUNDS: u32 = 3;
+const STEPS: (f64, f64) = (0.25, 0.7);
+
+/// The tolerance of another round for an image of which `asked` was wanted and whose last round, number `rounds`, worked
+/// to `tolerance` and estimates `estimate`, limited by the part of that name ([`Limit::name`]); `None` where it is good
+/// enough or would hardly be better.
+pub fn again(asked: f64, tolerance: f64, estimate: f64, limit: &str, rounds: u32) -> Option<f64> {
+    let done = estimate <= PASSES * asked || rounds >= ROUNDS || limit != Limit::Visibility.name();
+    let next = tolerance * clamp(PASSES * asked / estimate, STEPS.0, STEPS.1);
+    (!done && check_tolerance(next).is_ok()).then_some(next)
+}

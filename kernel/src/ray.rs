@@ -121,12 +121,13 @@ fn exact_edges([a, b, c]: [[f64; 2]; 3]) -> [f64; 3] {
     [cross(c, b), cross(a, c), cross(b, a)]
 }
 
+/// The axes that follow each, in turn.
+pub(crate) const NEXT: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
 /// What is computed once per ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
     direction: Vec3,
-    /// 1 / direction, large instead of infinite.
-    pub inverse: Vec3,
     /// The axes of the image plane, and the one along which corners are sheared (the direction's largest).
     pub axes: [usize; 3],
     pub shear: [f64; 2],
@@ -138,28 +139,26 @@ impl Line {
     pub fn new(ray: &Ray) -> Option<Line> {
         let d = ray.direction.to_array();
         let [x, y, z] = d.map(fabs);
-        let (along, largest) = if x > y && x > z {
-            (0, x)
-        } else if y > z {
-            (1, y)
-        } else {
-            (2, z)
-        };
+        // without branches, which no processor foresees
+        let along = if (x > y) & (x > z) { 0 } else { 2 - usize::from(y > z) };
+        let largest = [x, y, z].at(along);
         if !(largest > SMALLEST && (x + y + z).is_finite() && ray.origin.is_finite()) {
             return None;
         }
-        let next = |axis: usize| if axis == 2 { 0 } else { axis + 1 };
-        let (mut first, mut second) = (next(along), next(next(along)));
-        if d[along] < 0.0 {
-            (first, second) = (second, first); // keeps the sense of rotation
-        }
-        let inverse = d.map(|c| 1.0 / if fabs(c) > SMALLEST { c } else { SMALLEST });
+        let backward = usize::from(d.at(along) < 0.0); // keeps the sense of rotation
+        let first = NEXT.at(along)[backward];
+        let second = NEXT.at(along)[1 - backward];
+        let inverse = 1.0 / d.at(along);
         Some(Line {
             direction: ray.direction,
-            inverse: Vec3::from_array(inverse),
             axes: [first, second, along],
-            shear: [d[first] * inverse[along], d[second] * inverse[along]],
+            shear: [d.at(first) * inverse, d.at(second) * inverse],
         })
+    }
+
+    /// 1 / direction, large instead of infinite.
+    pub fn inverse(direction: Vec3) -> Vec3 {
+        Vec3::from_array(direction.to_array().map(|c| 1.0 / if fabs(c) > SMALLEST { c } else { SMALLEST }))
     }
 
     /// The image of a corner, given relative to the ray's origin.
@@ -206,8 +205,9 @@ impl Line {
     fn clamp(&self, t: f64, moved: &[Vec3; 3]) -> f64 {
         let [a, b, c] = *moved;
         let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
-        let slack = self.inverse.abs() * (reach * SLACK);
-        let (p, q, r) = (a * self.inverse, b * self.inverse, c * self.inverse);
+        let inverse = Line::inverse(self.direction);
+        let slack = inverse.abs() * (reach * SLACK);
+        let (p, q, r) = (a * inverse, b * inverse, c * inverse);
         let entry = (p.min(q).min(r) - slack).max_element();
         let exit = (p.max(q).max(r) + slack).min_element();
         let below = if t < exit { t } else { exit };

@@ -1,7 +1,8 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
 
+use crate::bvh::Ahead;
 use crate::camera::Camera;
-use crate::chain::{Sample, Solved, Terms};
+use crate::chain::{Sample, Solved, Terms, Work};
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::{Vec3, frame, unit};
@@ -87,17 +88,28 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
     let bands = solved.shape.bands;
     let scale = solved.scene.scale();
     let area = view.cell_area / (scale * scale);
-    let mut terms = Terms::ZERO;
+    let (mut terms, mut work) = (Terms::ZERO, Work::ZERO);
     for (row, sums) in range.zip(out) {
         *sums = Sums::ZERO;
         let sequence = Sequence::new(hash2(row as u32, 0x5160_0000));
-        for column in 0..view.cells {
-            let (x, y) = sequence.pair(column as u32 & 0xffff, 0);
-            let origin = view.corner + view.right * (column as f64 + x) + view.up * (row as f64 + y);
-            let ray = Ray::new(origin, view.forward);
+        let mut ahead = Ahead::default();
+        let cell = |column: u32| {
+            let (x, y) = sequence.pair(column & 0xffff, 0);
+            let origin = view.corner + view.right * (f64::from(column) + x) + view.up * (row as f64 + y);
+            Ray::new(origin, view.forward)
+        };
+        let cells = view.cells as u32;
+        for column in 0..cells {
+            let ray = cell(column);
+            let any = |n| if n == column { ray } else { cell(n) };
+            let hit = solved.bvh.closest_of(&mut ahead, column, cells, any);
             terms.clear(bands);
-            let path =
-                solved.radiance(&ray, Sample::OneOf { seed: row as u32, index: column as u32 }, &mut terms);
+            let path = solved.radiance_at(
+                (&ray, hit),
+                Sample::OneOf { seed: row as u32, index: column },
+                &mut terms,
+                &mut work,
+            );
             sums.rays += 1 + u64::from(path.rays);
             if path.object {
                 sums.area += area;

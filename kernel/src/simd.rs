@@ -56,7 +56,7 @@ pub fn run<T: Task>(isa: Isa, task: T) -> T::Out {
     task.run()
 }
 
-/// Eight f32 or four f64 at a time, for loops that LLVM does not vectorise well by itself: the same traversal over
+/// Eight f32 at a time, for loops that LLVM does not vectorise well by itself: the same traversal over
 /// arrays, whose lanes it splits at the comparisons, runs at 0.7 of the speed.
 ///
 /// A value of the type proves that the processor has the instructions. Every operation is IEEE's, lane by lane;
@@ -64,7 +64,8 @@ pub fn run<T: Task>(isa: Isa, task: T) -> T::Out {
 #[allow(missing_docs)]
 pub trait Lanes: Copy {
     type F8: Copy;
-    type F4: Copy;
+    /// Eight yes or no, as all bits or none.
+    type M8: Copy;
     fn splat8(self, x: f32) -> Self::F8;
     fn load8(self, x: &[f32; 8]) -> Self::F8;
     fn store8(self, x: Self::F8) -> [f32; 8];
@@ -74,15 +75,16 @@ pub trait Lanes: Copy {
     fn max8(self, a: Self::F8, b: Self::F8) -> Self::F8;
     /// Lanes with `a <= b`, as bits.
     fn le8(self, a: Self::F8, b: Self::F8) -> u32;
-    fn splat4(self, x: f64) -> Self::F4;
-    fn load4(self, x: &[f64; 4]) -> Self::F4;
-    fn store4(self, x: Self::F4) -> [f64; 4];
-    fn sub4(self, a: Self::F4, b: Self::F4) -> Self::F4;
-    fn mul4(self, a: Self::F4, b: Self::F4) -> Self::F4;
-    fn min4(self, a: Self::F4, b: Self::F4) -> Self::F4;
-    fn max4(self, a: Self::F4, b: Self::F4) -> Self::F4;
-    /// Lanes with `a <= b`, as bits.
-    fn le4(self, a: Self::F4, b: Self::F4) -> u32;
+    /// Lanes with `a <= b`.
+    fn mask8(self, a: Self::F8, b: Self::F8) -> Self::M8;
+    /// `a` in the lanes of `mask`, else `b`.
+    fn choose8(self, mask: Self::M8, a: Self::F8, b: Self::F8) -> Self::F8;
+    /// Adds `bits` to the lanes of `mask`.
+    fn mark8(self, marks: Self::M8, mask: Self::M8, bits: u32) -> Self::M8;
+    /// Lanes equal to `x`, as bits.
+    fn same8(self, a: &[u32; 8], x: u32) -> u32;
+    fn none8(self) -> Self::M8;
+    fn marks8(self, marks: Self::M8) -> [u32; 8];
 }
 
 /// A computation in explicit lanes; `run` must be `#[inline(always)]`.
@@ -114,64 +116,82 @@ pub fn run_lanes<T: LaneTask>(isa: Isa, task: T) -> T::Out {
 #[derive(Clone, Copy, Debug)]
 struct Arrays;
 
+/// One operation of [`Arrays`], lane by lane.
 macro_rules! arrays {
-    ($t:ty, $n:literal, $splat:ident $load:ident $store:ident $sub:ident $mul:ident $min:ident $max:ident $le:ident) => {
+    ($($name:ident($a:ident, $b:ident) = $of:expr;)*) => { $(
         #[inline(always)]
-        fn $splat(self, x: $t) -> [$t; $n] {
-            [x; $n]
-        }
-        #[inline(always)]
-        fn $load(self, x: &[$t; $n]) -> [$t; $n] {
-            *x
-        }
-        #[inline(always)]
-        fn $store(self, x: [$t; $n]) -> [$t; $n] {
-            x
-        }
-        #[inline(always)]
-        fn $sub(self, mut a: [$t; $n], b: [$t; $n]) -> [$t; $n] {
-            for i in 0..$n {
-                a[i] -= b[i];
+        fn $name(self, mut a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+            for ($a, &$b) in a.iter_mut().zip(&b) {
+                *$a = $of;
             }
             a
         }
-        #[inline(always)]
-        fn $mul(self, mut a: [$t; $n], b: [$t; $n]) -> [$t; $n] {
-            for i in 0..$n {
-                a[i] *= b[i];
-            }
-            a
-        }
-        #[inline(always)]
-        fn $min(self, mut a: [$t; $n], b: [$t; $n]) -> [$t; $n] {
-            for i in 0..$n {
-                a[i] = if a[i] < b[i] { a[i] } else { b[i] };
-            }
-            a
-        }
-        #[inline(always)]
-        fn $max(self, mut a: [$t; $n], b: [$t; $n]) -> [$t; $n] {
-            for i in 0..$n {
-                a[i] = if a[i] > b[i] { a[i] } else { b[i] };
-            }
-            a
-        }
-        #[inline(always)]
-        fn $le(self, a: [$t; $n], b: [$t; $n]) -> u32 {
-            let mut mask = 0;
-            for i in 0..$n {
-                mask |= u32::from(a[i] <= b[i]) << i;
-            }
-            mask
-        }
-    };
+    )* };
 }
 
 impl Lanes for Arrays {
     type F8 = [f32; 8];
-    type F4 = [f64; 4];
-    arrays!(f32, 8, splat8 load8 store8 sub8 mul8 min8 max8 le8);
-    arrays!(f64, 4, splat4 load4 store4 sub4 mul4 min4 max4 le4);
+    type M8 = [u32; 8];
+    arrays! {
+        sub8(a, b) = *a - b;
+        mul8(a, b) = *a * b;
+        min8(a, b) = if *a < b { *a } else { b };
+        max8(a, b) = if *a > b { *a } else { b };
+    }
+    #[inline(always)]
+    fn splat8(self, x: f32) -> [f32; 8] {
+        [x; 8]
+    }
+    #[inline(always)]
+    fn load8(self, x: &[f32; 8]) -> [f32; 8] {
+        *x
+    }
+    #[inline(always)]
+    fn store8(self, x: [f32; 8]) -> [f32; 8] {
+        x
+    }
+    #[inline(always)]
+    fn le8(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        let mut mask = 0;
+        for i in 0..8 {
+            mask |= u32::from(a[i] <= b[i]) << i;
+        }
+        mask
+    }
+    #[inline(always)]
+    fn mask8(self, a: [f32; 8], b: [f32; 8]) -> [u32; 8] {
+        let mut mask = [0; 8];
+        for i in 0..8 {
+            mask[i] = 0u32.wrapping_sub(u32::from(a[i] <= b[i]));
+        }
+        mask
+    }
+    #[inline(always)]
+    fn choose8(self, mask: [u32; 8], a: [f32; 8], mut b: [f32; 8]) -> [f32; 8] {
+        for i in 0..8 {
+            b[i] = if mask[i] != 0 { a[i] } else { b[i] };
+        }
+        b
+    }
+    #[inline(always)]
+    fn mark8(self, mut marks: [u32; 8], mask: [u32; 8], bits: u32) -> [u32; 8] {
+        for i in 0..8 {
+            marks[i] |= mask[i] & bits;
+        }
+        marks
+    }
+    #[inline(always)]
+    fn same8(self, a: &[u32; 8], x: u32) -> u32 {
+        (0..).zip(a).fold(0, |mask, (i, &own)| mask | u32::from(own == x) << i)
+    }
+    #[inline(always)]
+    fn none8(self) -> [u32; 8] {
+        [0; 8]
+    }
+    #[inline(always)]
+    fn marks8(self, marks: [u32; 8]) -> [u32; 8] {
+        marks
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -191,28 +211,9 @@ mod avx2 {
     }
 
     macro_rules! avx2 {
-        ($t:ty, $n:literal, $v:ty, $loadu:ident $storeu:ident $set1:ident, $splat:ident $load:ident $store:ident) => {
+        ($($name:ident = $op:ident),*) => { $(
             #[inline(always)]
-            fn $splat(self, x: $t) -> $v {
-                // SAFETY: `self` proves AVX2.
-                unsafe { $set1(x) }
-            }
-            #[inline(always)]
-            fn $load(self, x: &[$t; $n]) -> $v {
-                // SAFETY: `self` proves AVX2; the array has as many bytes as the register, and no alignment is asked.
-                unsafe { $loadu(x.as_ptr()) }
-            }
-            #[inline(always)]
-            fn $store(self, x: $v) -> [$t; $n] {
-                let mut out = [0.0; $n];
-                // SAFETY: as for the load, into an array of our own.
-                unsafe { $storeu(out.as_mut_ptr(), x) };
-                out
-            }
-        };
-        ($v:ty, $($name:ident = $op:ident),*) => { $(
-            #[inline(always)]
-            fn $name(self, a: $v, b: $v) -> $v {
+            fn $name(self, a: __m256, b: __m256) -> __m256 {
                 // SAFETY: `self` proves AVX2.
                 unsafe { $op(a, b) }
             }
@@ -221,26 +222,65 @@ mod avx2 {
 
     impl super::Lanes for Avx2 {
         type F8 = __m256;
-        type F4 = __m256d;
-        avx2!(f32, 8, __m256, _mm256_loadu_ps _mm256_storeu_ps _mm256_set1_ps, splat8 load8 store8);
-        avx2!(__m256, sub8 = _mm256_sub_ps, mul8 = _mm256_mul_ps, min8 = _mm256_min_ps, max8 = _mm256_max_ps);
-        avx2!(f64, 4, __m256d, _mm256_loadu_pd _mm256_storeu_pd _mm256_set1_pd, splat4 load4 store4);
-        avx2!(
-            __m256d,
-            sub4 = _mm256_sub_pd,
-            mul4 = _mm256_mul_pd,
-            min4 = _mm256_min_pd,
-            max4 = _mm256_max_pd
-        );
+        type M8 = __m256;
+        avx2!(sub8 = _mm256_sub_ps, mul8 = _mm256_mul_ps, min8 = _mm256_min_ps, max8 = _mm256_max_ps);
+        #[inline(always)]
+        fn splat8(self, x: f32) -> __m256 {
+            // SAFETY: `self` proves AVX2.
+            unsafe { _mm256_set1_ps(x) }
+        }
+        #[inline(always)]
+        fn load8(self, x: &[f32; 8]) -> __m256 {
+            // SAFETY: `self` proves AVX2; the array has as many bytes as the register, and no alignment is asked.
+            unsafe { _mm256_loadu_ps(x.as_ptr()) }
+        }
+        #[inline(always)]
+        fn store8(self, x: __m256) -> [f32; 8] {
+            let mut out = [0.0; 8];
+            // SAFETY: as for the load, into an array of our own.
+            unsafe { _mm256_storeu_ps(out.as_mut_ptr(), x) };
+            out
+        }
         #[inline(always)]
         fn le8(self, a: __m256, b: __m256) -> u32 {
             // SAFETY: `self` proves AVX2.
             unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32 }
         }
         #[inline(always)]
-        fn le4(self, a: __m256d, b: __m256d) -> u32 {
+        fn mask8(self, a: __m256, b: __m256) -> __m256 {
             // SAFETY: `self` proves AVX2.
-            unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(a, b)) as u32 }
+            unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) }
+        }
+        #[inline(always)]
+        fn choose8(self, mask: __m256, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: `self` proves AVX2.
+            unsafe { _mm256_blendv_ps(b, a, mask) }
+        }
+        #[inline(always)]
+        fn mark8(self, marks: __m256, mask: __m256, bits: u32) -> __m256 {
+            // SAFETY: `self` proves AVX2.
+            unsafe {
+                let bits = _mm256_castsi256_ps(_mm256_set1_epi32(bits.cast_signed()));
+                _mm256_or_ps(marks, _mm256_and_ps(mask, bits))
+            }
+        }
+        #[inline(always)]
+        fn same8(self, a: &[u32; 8], x: u32) -> u32 {
+            // SAFETY: `self` proves AVX2; the array has as many bytes as the register, and no alignment is asked.
+            unsafe {
+                let a = _mm256_loadu_si256(a.as_ptr().cast());
+                let same = _mm256_cmpeq_epi32(a, _mm256_set1_epi32(x.cast_signed()));
+                _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32
+            }
+        }
+        #[inline(always)]
+        fn none8(self) -> __m256 {
+            // SAFETY: `self` proves AVX2.
+            unsafe { _mm256_setzero_ps() }
+        }
+        #[inline(always)]
+        fn marks8(self, marks: __m256) -> [u32; 8] {
+            self.store8(marks).map(f32::to_bits)
         }
     }
 }

@@ -6,7 +6,7 @@
 //! error counts most.
 
 use crate::arena::{Arena, Need, plain_struct};
-use crate::bvh::Bvh;
+use crate::bvh::{Ahead, Bvh};
 use crate::error::Error;
 use crate::index::{Index, IndexMut, span};
 use crate::math::{Vec3, frame};
@@ -155,7 +155,7 @@ impl<'m> Cut<'m> {
         }
         let values = self.unevenness.part(range.clone());
         let elements = self.facets + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
-        let cuts = (self.most.saturating_sub(elements) / (QUARTERS - 1))
+        let cuts = (self.most.saturating_sub(elements) * 3 / (4 * (QUARTERS - 1)))
             .min(self.nodes.len().saturating_sub(self.used) / QUARTERS);
         let threshold = threshold(values, self.goal - self.settled, cuts);
         for at in range.clone() {
@@ -316,9 +316,11 @@ impl Probe<'_> {
         sums: &mut Sums,
         backs: &mut [u32; POINTS],
     ) {
-        for ((origin, sum), backs) in origins.iter().zip(sums).zip(backs) {
-            let ray = origin.leave(flat + origin.normal * dz);
-            *sum += match self.bvh.closest(&ray) {
+        let mut ahead = Ahead::default();
+        let leave = |origin: &Surface| origin.leave(flat + origin.normal * dz);
+        let any = |n: u32| leave(origins.get(n as usize).unwrap_or(&origins[0]));
+        for ((n, sum), backs) in (0..POINTS as u32).zip(sums).zip(backs) {
+            *sum += match self.bvh.closest_of(&mut ahead, n, POINTS as u32, any) {
                 None => 1.0,
                 Some(hit) => match Surface::of_hit(self.scene, &hit) {
                     None => {
@@ -362,9 +364,9 @@ fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64,
     let mut means = [0.0; 4];
     let row = |point: usize| {
         let (x, y) = middle(point);
-        [x, y, half[point] / rays, (all[point] - half[point]) / rays]
+        [x, y, half.at(point) / rays, (all.at(point) - half.at(point)) / rays]
     };
-    let points = || (0..POINTS).filter(|p| seen[*p]);
+    let points = || (0..POINTS).filter(|p| seen.at(*p));
     points().for_each(|p| means.iter_mut().zip(row(p)).for_each(|(m, v)| *m += v / count));
     let mut products = [[0.0; 4]; 4];
     for p in points() {

@@ -102,6 +102,69 @@ static void check_image(const blik_solution *solution)
     free(scratch);
 }
 
+/* Two grey circles side by side, in the plane. */
+static void check_plane(void)
+{
+    blik_error error;
+    blik_plane_body bodies[2];
+    blik_plane_material material;
+    blik_plane_bodies all;
+    blik_plane_settings settings;
+    blik_plane_sky sky;
+    blik_plane_light light;
+    blik_plane_sample samples[50];
+    blik_plane_lobe lobe;
+    const blik_plane_scene *scene = NULL;
+    const blik_plane_coupling *coupling = NULL;
+    const blik_plane_solution *solution = NULL;
+    void *blocks[4];
+    size_t bytes = 0;
+    int i;
+    blik_plane_body_init(&bodies[0]);
+    bodies[0].elements = 12;
+    bodies[1] = bodies[0];
+    bodies[1].centre[0] = 2.5;
+    blik_plane_material_init(&material);
+    material.diffuse = 0.3;
+    material.specular = 0.1;
+    blik_plane_bodies_init(&all);
+    all.bodies = bodies;
+    all.body_count = 2;
+    all.materials = &material;
+    all.material_count = 1;
+    blik_plane_settings_init(&settings);
+    blik_plane_sky_init(&sky);
+    blik_plane_light_init(&light);
+    light.sky = &sky;
+
+    REQUIRE(blik_plane_scene_size(&all, &error, &bytes) == BLIK_OK);
+    blocks[0] = memory(bytes);
+    REQUIRE(blik_plane_scene_init(&all, &settings, blocks[0], bytes, &error, &scene) == BLIK_OK);
+    REQUIRE(blik_plane_coupling_size(scene, NULL, &error, &bytes) == BLIK_OK);
+    blocks[1] = memory(bytes);
+    REQUIRE(blik_plane_coupling_init(scene, NULL, blocks[1], bytes - 1, &error, &coupling) ==
+            BLIK_ERROR_BUFFER_TOO_SMALL);
+    REQUIRE(error.needed == bytes && coupling == NULL);
+    REQUIRE(blik_plane_coupling_init(scene, NULL, blocks[1], bytes, &error, &coupling) == BLIK_OK);
+    REQUIRE(blik_plane_solution_size(coupling, &light, NULL, &error, &bytes) == BLIK_OK);
+    blocks[2] = memory(bytes);
+    REQUIRE(blik_plane_solution_init(coupling, &light, NULL, blocks[2], bytes, &error, &solution) == BLIK_OK);
+    REQUIRE(blik_plane_scratch_size(solution, NULL, &error, &bytes) == BLIK_OK);
+    blocks[3] = memory(bytes);
+    REQUIRE(blik_plane_image(solution, 0.0, 50, 0, 50, NULL, blocks[3], bytes, &error, samples) == BLIK_OK);
+    for (i = 0; i < 50; ++i) {
+        REQUIRE(samples[i].object == 1 ? samples[i].radiance > 0.15 && samples[i].radiance < 0.5
+                                       : samples[i].radiance == 1.0);
+    }
+    /* seen from the side on which the line between the centres is the axis, the image is its own mirror image */
+    REQUIRE(fabs(samples[3].radiance - samples[46].radiance) < 1e-4);
+    REQUIRE(blik_plane_image(solution, 0.0, 50, 1, 50, NULL, blocks[3], bytes, &error, samples) == BLIK_ERROR_RANGE);
+    REQUIRE(blik_plane_gloss(10.0, 1.0, 0.0, &error, &lobe) == BLIK_OK && lobe.albedo == 1.0);
+    for (i = 4; i > 0; --i) {
+        free(blocks[i - 1]);
+    }
+}
+
 int main(void)
 {
     blik_error error;
@@ -184,6 +247,7 @@ int main(void)
         blik_scene_destroy(own_scene);
     }
 #endif
+    check_plane();
     puts("ok");
     return 0;
 }

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <thread>
 #include <vector>
 
@@ -88,11 +89,13 @@ int main() {
     struct tracer {
         blik::scene scene;
         bool right;
-        std::atomic<std::size_t> calls{0};
+        std::atomic<std::size_t> rays{0}, calls{0}, shadows{0}, shadow_calls{0}, most{0};
     };
     const auto first_facets = [](void *user, const blik_ray *sent, std::size_t count, uint32_t *found) {
         tracer &self = *static_cast<tracer *>(user);
-        self.calls += count;
+        self.rays += count;
+        self.most = std::max<std::size_t>(self.most, count);
+        self.calls += 1;
         for (std::size_t i = 0; i < count; ++i) {
             blik_hit hit;
             hit.facet = 3;
@@ -103,12 +106,14 @@ int main() {
         }
     };
     const auto any_facets = [](void *user, const blik_ray *sent, std::size_t count, uint8_t *found) {
+        static_cast<tracer *>(user)->shadows += count;
+        static_cast<tracer *>(user)->shadow_calls += 1;
         if (blik_any_hits(static_cast<tracer *>(user)->scene.get(), sent, count, nullptr, nullptr, found) != BLIK_OK) {
             std::abort();
         }
     };
     for (const bool right : {true, false}) {
-        tracer other{blik::scene(mesh), right};
+        tracer other{blik::scene(mesh), right, {}, {}, {}, {}, {}};
         blik_intersector intersector;
         blik_intersector_init(&intersector);
         intersector.first_facets = first_facets;
@@ -117,7 +122,14 @@ int main() {
         blik::scene traced(mesh);
         traced.set_intersector(intersector);
         const blik::coupling own(traced, blik::settings(2e-2), blik::threads(2));
-        REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.calls > 1000);
+        REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.rays > 1000);
+        // in batches where the library may
+        REQUIRE(other.most == 32 && other.rays > other.calls && other.shadows > other.shadow_calls);
+        std::vector<blik_ray> many(100, rays[0]);
+        std::vector<blik_hit> found(100);
+        const std::size_t before = other.calls;
+        traced.closest_hits(many, found);
+        REQUIRE(found[99].t == 2.0 && other.calls - before <= 10);
     }
     REQUIRE(blik_scene_set_intersector(scene.get(), nullptr, nullptr) == BLIK_OK);
 
@@ -134,6 +146,39 @@ int main() {
         thread.join();
     }
     REQUIRE(same == std::vector<int>(4, 1));
+
+    // budgets: fewer rays, in less memory, and a report that says what it costs
+    blik_settings fine = blik::settings(2e-3);
+    const blik::coupling full(scene, fine);
+    fine.ray_budget = full.info().rays / 8;
+    const blik::coupling few(scene, fine);
+    REQUIRE(few.info().rays < full.info().rays / 2 && few.info().pairs > 0);
+    const blik::solution dim(few, sun), bright_one(full, sun);
+    const blik_report rough = dim.report(dim.image(camera).tally), exact = bright_one.report(bright_one.image(camera).tally);
+    REQUIRE(rough.error_estimate > exact.error_estimate && rough.visibility_rays == few.info().rays);
+    fine.ray_budget = 0;
+    fine.fit_memory = 1;
+    std::size_t room = 0;
+    blik_error told_why{};
+    REQUIRE(blik_coupling_size(scene.get(), &fine, &told_why, &room) == BLIK_OK);
+    room += full.info().bytes / 4;
+    std::vector<unsigned char> little(room);
+    const blik_coupling *squeezed = nullptr;
+    REQUIRE(blik_coupling_init(scene.get(), &fine, nullptr, little.data(), room, &told_why, &squeezed) == BLIK_OK);
+    blik_coupling_info squeezed_info{};
+    REQUIRE(blik_coupling_get_info(squeezed, nullptr, &squeezed_info) == BLIK_OK);
+    REQUIRE(squeezed_info.bytes <= room && squeezed_info.rays < full.info().rays && squeezed_info.pairs > 0);
+    fine.fit_memory = 0;
+    REQUIRE(blik_coupling_init(scene.get(), &fine, nullptr, little.data(), room, &told_why, &squeezed) ==
+            BLIK_ERROR_BUFFER_TOO_SMALL);
+    REQUIRE(told_why.needed > room && told_why.given == room);
+    blik_tally odd = alone.tally;
+    odd.noise_squared = std::numeric_limits<double>::quiet_NaN();
+    blik_report none_of_it{};
+    REQUIRE(blik_get_report(solution.get(), &odd, &told_why, &none_of_it) == BLIK_ERROR_RANGE);
+    REQUIRE(told_why.field == BLIK_FIELD_TALLY && none_of_it.tolerance == 0.0);
+    odd.chain_rays = UINT64_MAX;
+    blik_tally_add(&odd, &odd);
 
     // an exception of a callback stops the stage and comes out where the caller asks for it
     int caught = 0;
@@ -175,6 +220,42 @@ int main() {
         const blik::scene none(bad);
     } catch (const blik::error &error) {
         caught += error.status() == BLIK_ERROR_VERTEX_INDEX && error.info().value == 6.0;
+    }
+    REQUIRE(caught == 2);
+
+    // the plane model: between two walls, and errors
+    blik::plane::bodies bodies;
+    bodies.circle(-1.25, 0, 1, 0, 12).circle(1.25, 0, 1, 0, 12).material(0.3, 0.1);
+    bodies.polygon({{-1, -3}, {1, -3}, {1, -2}, {-1, -2}}, 1, 2).material(0.5, 0.2, 8.0);
+    const blik::plane::scene flat(bodies, blik::plane::settings(1e-3));
+    const blik::plane::coupling rows(flat, blik::threads(2));
+    blik::plane::solution even(rows, blik::plane::light(blik::plane::sky()));
+    const std::vector<blik_plane_sample> line = even.image(0.3, 200);
+    REQUIRE(flat.info().primitives == 6 && rows.info().unknowns == even.unknowns(flat).size());
+    REQUIRE(std::all_of(line.begin(), line.end(), [](const blik_plane_sample &s) {
+        return s.object == 0 ? s.radiance == 1.0 : s.radiance > 0.05 && s.radiance < 1.0;
+    }));
+    const blik::plane::light both(blik::plane::sky(), blik::plane::sun({1, 2}));
+    const blik::plane::solution lit(rows, both, blik::threads(3));
+    const std::vector<blik_plane_sample> bright = lit.image(0.3, 200), again = lit.image(0.3, 200, blik::threads(3));
+    for (std::size_t i = 0; i < 200; ++i) {
+        REQUIRE(bright[i].radiance >= line[i].radiance && bright[i].radiance == again[i].radiance);
+    }
+    const std::vector<blik_plane_ray> down = {{{-1.25, 5}, {0, -1}}};
+    REQUIRE(flat.first_hits(down)[0].primitive == 0 && lit.radiance(down)[0].object == 1);
+    REQUIRE(flat.visible({0, 5}, {0, 1}).size() == 1 && flat.visible({0, 5}, {0, -1}).size() >= 5);
+    even = blik::plane::solution(rows, both);
+    REQUIRE(even.info().contraction < 1.0 && even.info().sweeps > 1);
+    caught = 0;
+    try {
+        const blik::plane::scene none{blik::plane::bodies()};
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_NO_FACETS;
+    }
+    try {
+        const blik::plane::scene none(blik::plane::bodies().circle(0, 0, -1, 0, 1).material(0.5));
+    } catch (const blik::error &error) {
+        caught += error.status() == BLIK_ERROR_BODY && error.info().field == BLIK_FIELD_BODY_RADIUS;
     }
     REQUIRE(caught == 2);
     std::puts("ok");

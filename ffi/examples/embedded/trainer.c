@@ -12,7 +12,7 @@
 #include "../craft.h"
 #endif
 
-enum { COLUMNS = 24, ROWS = 16, MEMORY = 2048 * 1024, PAINT = 0x5a };
+enum { COLUMNS = 24, ROWS = 16, MEMORY = 512 * 1024, PAINT = 0x5a };
 
 static _Alignas(64) unsigned char memory[MEMORY];
 static size_t used;

@@ -4,7 +4,7 @@ use super::case::Case;
 use super::pixels::{self, Sampled};
 use crate::kernel;
 use blik_kernel::Error;
-use blik_kernel::host::{GeometryMemory, Host, Report, Settings};
+use blik_kernel::host::{GeometryMemory, Host, Report, Rounds, Settings};
 use blik_kernel::scene::{Gloss, MaterialInput, SceneInput};
 use blik_kernel::sun::SunInput;
 use std::time::Instant;
@@ -30,7 +30,6 @@ pub struct Outcome {
 /// Geometry, light and image of a case at `tolerance`, its pixels compared with so many rays through each.
 pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
     let host = Host::new(0)?;
-    let settings = Settings { tolerance, ..Settings::default() };
     let materials: Vec<MaterialInput<'_>> = case
         .materials
         .iter()
@@ -59,26 +58,33 @@ pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
         half_angle_deg: sun.half_angle.to_degrees(),
     });
     let start = Instant::now();
+    let mut rounds = Rounds::new(tolerance);
     let mut memory = GeometryMemory::default();
-    let geometry = host.geometry(&mut memory, &input, &settings)?;
-    let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
-    let image = host.image(&lit, &case.camera, false)?;
-    let seconds = start.elapsed().as_secs_f64();
-    Ok(Outcome {
-        pixels: image.pixels.iter().map(|&p| f64::from(p)).collect(),
-        reference: lit.reference().to_vec(),
-        irradiance: kernel::irradiances(&lit),
-        shares: (0..case.mesh.facets.len())
-            .map(|f| {
-                geometry
-                    .elements()
-                    .unknowns_of(f, 0)
-                    .map(|u| geometry.elements().share(u))
-                    .fold(1.0, f64::min)
-            })
-            .collect(),
-        report: image.report,
-        seconds,
-        sampled: (rays > 0).then(|| pixels::compare(&lit, &case.camera, rays)).transpose()?,
-    })
+    loop {
+        let settings = Settings { tolerance: rounds.tolerance(), ..Settings::default() };
+        let geometry = host.geometry(&mut memory, &input, &settings)?;
+        let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
+        let mut image = host.image(&lit, &case.camera, false)?;
+        if rounds.again(&mut image.report) {
+            continue;
+        }
+        let seconds = start.elapsed().as_secs_f64();
+        return Ok(Outcome {
+            pixels: image.pixels.iter().map(|&p| f64::from(p)).collect(),
+            reference: lit.reference().to_vec(),
+            irradiance: kernel::irradiances(&lit),
+            shares: (0..case.mesh.facets.len())
+                .map(|f| {
+                    geometry
+                        .elements()
+                        .unknowns_of(f, 0)
+                        .map(|u| geometry.elements().share(u))
+                        .fold(1.0, f64::min)
+                })
+                .collect(),
+            report: image.report,
+            seconds,
+            sampled: (rays > 0).then(|| pixels::compare(&lit, &case.camera, rays)).transpose()?,
+        });
+    }
 }

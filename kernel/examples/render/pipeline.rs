@@ -4,7 +4,7 @@ use std::path::Path;
 
 use blik_kernel::Error;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
-use blik_kernel::host::{GeometryMemory, Host, Lit, Settings};
+use blik_kernel::host::{GeometryMemory, Host, Lit, Rounds, Settings};
 use blik_kernel::scene::{Gloss, MaterialInput, SceneInput};
 use blik_kernel::sky::{SkyInput, SkyModel, SkyTable};
 use blik_kernel::sun::SunInput;
@@ -65,37 +65,43 @@ pub fn run(job: &Job, progress: &Progress) -> Outcome<Rendered> {
 fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
     let scene = job.scene;
     let host = Host::new(job.threads)?;
-    let settings = Settings {
-        tolerance: scene.tolerance,
-        max_bounces: scene.max_bounces,
-        reference_radiance: scene.reference_radiance.clone(),
-        all_irradiances: job.facets,
-        // A uniform sky is told by closure, without the directions in which it is seen.
-        directional: scene.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform)),
-    };
     let materials: Vec<MaterialInput> =
         job.materials.iter().map(|material| material_input(material)).collect();
-    let mut memory = GeometryMemory::default();
-    progress.stage("coupling");
-    let geometry = host.geometry(&mut memory, &scene_input(job, &materials), &settings)?;
     let sky = scene.sky.as_ref().map(|sky| sky_input(sky, job.table.as_ref()));
     let sun = scene.sun.as_ref().map(|sun| SunInput {
         direction: sun.direction,
         irradiance: &sun.irradiance,
         half_angle_deg: sun.half_angle_deg,
     });
-    progress.stage("light");
-    let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
-    progress.stage("image");
-    let image = host.image(&lit, &camera_input(&scene.camera), job.components)?;
-    Ok(Rendered {
-        columns: image.columns,
-        rows: image.rows,
-        pixels: image.pixels,
-        components: image.components,
-        facets: if job.facets { facet_rows(&lit) } else { Vec::new() },
-        report: Report::new(image.report),
-    })
+    let mut rounds = Rounds::new(scene.tolerance);
+    let mut memory = GeometryMemory::default();
+    loop {
+        let settings = Settings {
+            tolerance: rounds.tolerance(),
+            max_bounces: scene.max_bounces,
+            reference_radiance: scene.reference_radiance.clone(),
+            all_irradiances: job.facets,
+            // A uniform sky is told by closure, without the directions in which it is seen.
+            directional: scene.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform)),
+        };
+        progress.stage("coupling");
+        let geometry = host.geometry(&mut memory, &scene_input(job, &materials), &settings)?;
+        progress.stage("light");
+        let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
+        progress.stage("image");
+        let mut image = host.image(&lit, &camera_input(&scene.camera), job.components)?;
+        if rounds.again(&mut image.report) {
+            continue;
+        }
+        return Ok(Rendered {
+            columns: image.columns,
+            rows: image.rows,
+            pixels: image.pixels,
+            components: image.components,
+            facets: if job.facets { facet_rows(&lit) } else { Vec::new() },
+            report: Report::new(image.report),
+        });
+    }
 }
 
 fn facet_rows(lit: &Lit) -> Vec<Row> {

@@ -23,6 +23,8 @@ pub struct Report {
     pub certified: Certified,
     /// The largest part of the estimate.
     pub limited_by: &'static str,
+    /// Rounds in which the image was computed, each finer than the one before.
+    pub rounds: u32,
     /// Facets of the mesh.
     pub facets: usize,
     /// Facets without area, kept out of the physics.
@@ -129,6 +131,7 @@ impl Report {
                 excludes: of.certified.excludes,
             },
             limited_by: of.limited_by,
+            rounds: of.rounds,
             facets: of.facets,
             degenerate_facets: of.degenerate_facets,
             bands: of.bands,

@@ -57,6 +57,11 @@ fn npy(bytes: &[u8]) -> Result<Table, String> {
             ));
         }
     };
+    // the crate multiplies the shape when it is asked for the data
+    let values = shape.iter().try_fold(1usize, |all, n| all.checked_mul(*n));
+    if values.is_none_or(|n| n > bytes.len()) {
+        return Err(format!("expected {shape:?} values, the file has {} bytes", bytes.len()));
+    }
     let fortran = file.order() == npyz::Order::Fortran;
     let stored: Vec<f32> = match file.try_data::<f32>() {
         Ok(data) => data.collect::<Result<_, _>>(),

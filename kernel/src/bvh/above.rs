@@ -39,10 +39,8 @@ pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
 fn leaf_rises(bvh: &Bvh<'_>, leaf: u32, normal: Vec3, height: f64) -> bool {
     let first = (leaf & !(LEAF | PAIR)) as usize;
     let packets = first..first + 1 + usize::from(leaf & PAIR != 0);
-    bvh.packets.get(packets).unwrap_or(&[]).iter().any(|packet| {
-        packet[..3].iter().any(|[x, y, z]| {
-            // lanes without a facet are NaN and compare false
-            x.iter().zip(y).zip(z).any(|((&x, &y), &z)| Vec3::new(x, y, z).dot(normal) > height)
-        })
+    bvh.facets.get(packets).unwrap_or(&[]).as_flattened().iter().any(|&facet| {
+        let solid = bvh.solids.get(facet as usize);
+        solid.is_some_and(|[a, b, c, _]| [a, b, c].iter().any(|&&x| Vec3::from_array(x).dot(normal) > height))
     })
 }

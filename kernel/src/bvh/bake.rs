@@ -1,10 +1,11 @@
 //! Trees in baked blocks.
 
-use super::{Boxes, Bvh, LANES, LEAF, MOST, NONE, PAIR, Packet, STACK, extent, fill};
+use super::{Boxes, Bvh, LEAF, MOST, NONE, PAIR, Packet, STACK, Slack, Solid, extent, packed, solid};
 use crate::arena::{View, plain_struct};
 use crate::bake::Writer;
 use crate::error::Error;
 use crate::index::Index;
+use crate::math::Vec3;
 use crate::scene::Scene;
 use crate::simd::Isa;
 
@@ -24,7 +25,9 @@ impl<'m> Bvh<'m> {
         writer.put(self.boxes)?;
         writer.put(self.children)?;
         writer.put(self.packets)?;
-        writer.put(self.facets)
+        writer.put(self.slacks)?;
+        writer.put(self.facets)?;
+        writer.put(self.solids)
     }
 
     pub(crate) fn get(view: &mut View<'m>, scene: &Scene<'_>, isa: Isa) -> Result<Bvh<'m>, Error> {
@@ -38,7 +41,9 @@ impl<'m> Bvh<'m> {
             boxes: view.take::<Boxes>(nodes)?,
             children: view.take(nodes)?,
             packets: view.take::<Packet>(packets)?,
+            slacks: view.take::<Slack>(packets)?,
             facets: view.take(packets)?,
+            solids: view.take::<Solid>(scene.facets())?,
             levels: 0,
             low,
             high,
@@ -84,22 +89,28 @@ impl<'m> Bvh<'m> {
         (all && levels * 7 < STACK).then_some(levels)
     }
 
-    /// Packets are copies of the facets that they name, each facet of nonzero area in one lane.
+    /// Packets and solids are copies of the facets that they name, each facet of nonzero area in one lane.
     fn packets_sound(&self, scene: &Scene<'_>) -> bool {
         let mut live = 0;
-        for (packet, lanes) in self.packets.iter().zip(self.facets) {
+        for ((packet, slack), lanes) in self.packets.iter().zip(self.slacks).zip(self.facets) {
             let known = |facet: &u32| *facet == NONE || scene.areas().at(*facet as usize) > 0.0;
             if !lanes.iter().all(known) {
                 return false;
             }
             live += lanes.iter().filter(|facet| **facet != NONE).count();
-            let mut wanted: Packet = [[[0.0; LANES]; 3]; 4];
-            fill(&mut wanted, lanes, scene.corners());
-            let (wanted, kept) = (wanted.as_flattened().as_flattened(), packet.as_flattened().as_flattened());
-            if wanted.iter().zip(kept).any(|(a, b)| a.to_bits() != b.to_bits()) {
+            let wanted = packed(lanes, scene.corners());
+            let differs = |(a, b): (&f32, &f32)| a.to_bits() != b.to_bits();
+            let (rows, kept) = (wanted.0.as_flattened().as_flattened(), packet.as_flattened().as_flattened());
+            if rows.iter().zip(kept).any(differs) || wanted.1.iter().zip(slack).any(differs) {
                 return false;
             }
         }
-        live == scene.facets() - scene.degenerate()
+        let same = |(kept, facet): (&Solid, &[Vec3; 3])| {
+            kept.as_flattened()
+                .iter()
+                .zip(solid(facet).as_flattened())
+                .all(|(a, b)| a.to_bits() == b.to_bits())
+        };
+        live == scene.facets() - scene.degenerate() && self.solids.iter().zip(scene.corners()).all(same)
     }
 }

@@ -86,10 +86,10 @@ struct Lanes<'a> {
 impl<'a> Lanes<'a> {
     fn new(facets: &'a mut [[u32; LANES]], live: usize) -> Self {
         facets.iter_mut().for_each(|lanes| *lanes = [NONE; LANES]);
-        Lanes { facets, used: 0, spare: live / 2 }
+        Lanes { facets, used: 0, spare: live }
     }
 
-    /// The child that stands for the leaf of these facets, at most [`LANES`]. The other facets of its packets, where
+    /// The child that stands for the leaf of these facets, at most [`LANES`](super::LANES). The other facets of its packets, where
     /// there are any, are tested along with it, which changes no hit.
     fn place<'f>(&mut self, leaf: impl ExactSizeIterator<Item = &'f u32>) -> u32 {
         let (start, count) = (self.used % LANES, leaf.len());

@@ -1,4 +1,4 @@
-//! One ray through the tree: eight boxes at a time in f32, four facets at a time in f64.
+//! One ray through the tree: eight boxes at a time in f32, then eight facets, whose hits are confirmed in f64.
 //!
 //! **Boxes are conservative.** A facet that the ray hits at `t` in the arithmetic of [`ray`](crate::ray) lies in
 //! boxes that are never culled while the limit is at least `t`. The hit arithmetic accepts no facet whose box,
@@ -6,23 +6,35 @@
 //! that box. The slab
 //! test works with the ray's origin moved outward on every axis by `pad`, which exceeds those, the rounding
 //! of the origin to f32 and the effect of replacing small direction components; its subtraction therefore has the
-//! right sign, and what is left is three roundings of 2^-24 relative, which [`WIDEN`] covers.
+//! right sign, and what is left is five roundings of 2^-24 relative (of the direction, its inverse, the difference, the
+//! product and the limit), which [`WIDEN`] covers.
+//!
+//! **So is the test of facets.** With s the mesh's size and u = 2^-24, the image of a corner in f32 is off by at most
+//! 55 u s where the origin is within 4 s: less than e = 4 `pad`. The images of a facet that the ray meets surround
+//! the origin and are no farther from it than twice the facet's extent x; products and rounding then leave its
+//! edge functions off by less than e (8.5 x + 2.3 e). Nothing is turned down for less than e (16 x + 4 e).
 
-use super::{Boxes, Bvh, LEAF, PAIR, Packet, STACK};
+use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, STACK, Slack};
 use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, fabs};
-use crate::ray::{Hit, Line, Ray};
+use crate::math::Vec3;
+use crate::ray::{Hit, Line, NEXT, Ray};
 use crate::simd::{self, LaneTask, Lanes};
 
-/// Factor on the far side of slabs: 1 + 2^-20, above the (1 + 2^-24)^8 that near and far sides need together.
+/// Factor on the far side of slabs: 1 + 2^-20, above the (1 + 2^-24)^10 that near and far sides need together.
 const WIDEN: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
 
 /// Direction components below this are raised to it in the slab test: across the whole scene it moves the ray
 /// by far less than `pad`, and keeps the quotients finite in f32.
-const SMALLEST: f64 = 1e-18;
+const SMALLEST: f32 = 1e-18;
+
+/// Origins from here on leave f32.
+const FARTHEST: f64 = 1e38;
+
+/// Times a facet's extent: error of its edge functions by that of the images.
+pub(super) const SLACK: f64 = 16.0;
 
 /// Entries of the short stack, enough for nine levels of nodes.
-const SHORT: usize = 64;
+pub(super) const SHORT: usize = 64;
 
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
@@ -57,69 +69,94 @@ impl<const ANY: bool, const N: usize> LaneTask for Search<'_, ANY, N> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        Walk::new(self.bvh, self.ray)?.search::<L, ANY, N>(lanes)
+        Walk::new(self.bvh, self.ray)?.search::<L, ANY, N>(lanes, self.bvh, self.ray)
     }
 }
 
-/// A ray on its way, and the best hit so far.
-struct Walk<'a> {
-    bvh: &'a Bvh<'a>,
-    ray: &'a Ray,
-    line: Line,
-    /// Which side of a box the ray meets first, by axis.
-    side: [usize; 3],
+/// A ray on its way. Axes are four, so that the compiler takes them together.
+#[derive(Clone, Copy)]
+pub(super) struct Walk {
     /// Origin for the near and the far sides, and 1/direction.
-    near: [f32; 3],
-    far: [f32; 3],
-    inverse: [f32; 3],
+    near: [f32; 4],
+    far: [f32; 4],
+    inverse: [f32; 4],
+    /// `nearest` for the boxes: from `start`, rounded up.
+    pub limit: f32,
+    /// Which side of a box the ray meets first, by axis.
+    side: [u8; 3],
+    axes: [u8; 3],
+    origin: [f32; 3],
+    shear: [f32; 2],
+    /// Error of an image.
+    error: f32,
+    skip: u32,
     /// Where the f32 origin stands on the ray, and how far it was moved outward.
     start: f64,
     pad: f64,
-    best: Option<Hit>,
     /// Hits must lie before this; equal `t` counts when the facet's index is lower.
     nearest: f64,
-    /// `nearest` for the boxes: from `start`, rounded up.
-    limit: f32,
 }
 
-impl<'a> Walk<'a> {
+impl Walk {
+    /// No ray.
+    pub const IDLE: Walk = Walk {
+        near: [0.0; 4],
+        far: [0.0; 4],
+        inverse: [0.0; 4],
+        limit: 0.0,
+        side: [0; 3],
+        axes: [0; 3],
+        origin: [0.0; 3],
+        shear: [0.0; 2],
+        error: 0.0,
+        skip: NONE,
+        start: 0.0,
+        pad: 0.0,
+        nearest: 0.0,
+    };
+
     /// `None` where the ray meets nothing for certain.
     #[inline(always)]
-    fn new(bvh: &'a Bvh<'a>, ray: &'a Ray) -> Option<Self> {
-        let line = Line::new(ray)?;
+    pub fn new(bvh: &Bvh, ray: &Ray) -> Option<Self> {
         let scale = bvh.scale;
-        let distance = ray.origin.abs().max_element();
+        let mut origin = wide(ray.origin);
         // 2^-20 of the scene is 4 times the rounding of an origin within 4 times its size.
-        let pad = scale * (1.0 / (1u64 << 20) as f64) + distance * (1.0 / (1u64 << 38) as f64);
-        let mut origin = ray.origin;
+        let mut pad = scale * (1.0 / (1u64 << 20) as f64);
         let mut start = 0.0;
-        if distance > 4.0 * scale {
-            start = entry(bvh, ray.origin, line.inverse, pad)?;
-            origin += ray.direction * start;
+        if !origin.iter().all(|x| x.abs() <= 4.0 * scale as f32) {
+            let distance = ray.origin.abs().max_element();
+            pad += distance * (1.0 / (1u64 << 38) as f64);
+            start = entry(bvh, ray.origin, Line::inverse(ray.direction), pad)?;
+            let moved = ray.origin + ray.direction * start;
+            // from so far away that not even the entry into the box is near it, nothing is hit; infinities would meet
+            // the children that there are not
+            if moved.abs().max_element() + pad > FARTHEST {
+                return None;
+            }
+            origin = wide(moved);
         }
-        let direction = ray.direction.to_array();
-        let inverse =
-            direction.map(|c| if fabs(c) > SMALLEST { (1.0 / c) as f32 } else { (1.0 / SMALLEST) as f32 });
-        let outward = Vec3::from_array(inverse.map(|c| if c < 0.0 { -pad } else { pad }));
+        let direction = wide(ray.direction);
+        let inverse = direction.map(|c| 1.0 / if c.abs() > SMALLEST { c } else { SMALLEST });
+        let [x, y, z, _] = direction.map(f32::abs);
+        let along = if (x > y) & (x > z) { 0 } else { 2 - usize::from(y > z) };
+        let [first, second] = NEXT.at(along);
+        let outward = pad as f32;
+        let away = inverse.map(|c| if c < 0.0 { -outward } else { outward });
         let mut walk = Walk {
-            bvh,
-            ray,
-            line,
-            side: inverse.map(|c| usize::from(c < 0.0)),
-            near: (origin + outward).to_array().map(|x| x as f32),
-            far: (origin - outward).to_array().map(|x| x as f32),
+            near: [origin[0] + away[0], origin[1] + away[1], origin[2] + away[2], origin[3] + away[3]],
+            far: [origin[0] - away[0], origin[1] - away[1], origin[2] - away[2], origin[3] - away[3]],
             inverse,
+            side: [inverse[0] < 0.0, inverse[1] < 0.0, inverse[2] < 0.0].map(u8::from),
+            axes: [first as u8, second as u8, along as u8],
+            origin: [origin.at(first), origin.at(second), origin.at(along)],
+            shear: [direction.at(first) * inverse.at(along), direction.at(second) * inverse.at(along)],
+            error: 4.0 * outward,
+            skip: ray.skip,
             start,
             pad,
-            best: None,
             nearest: ray.t_max,
             limit: 0.0,
         };
-        // from so far away that not even the entry into the box is near it, nothing is hit; infinities would meet the
-        // children that there are not
-        if !walk.near.iter().chain(&walk.far).all(|x| x.is_finite()) {
-            return None;
-        }
         walk.shorten(ray.t_max);
         Some(walk)
     }
@@ -133,16 +170,23 @@ impl<'a> Walk<'a> {
 
     /// The walk itself: nearest child first, the rest on the stack with their distances.
     #[inline(always)]
-    fn search<L: Lanes, const ANY: bool, const N: usize>(mut self, lanes: L) -> Option<Hit> {
+    fn search<L: Lanes, const ANY: bool, const N: usize>(
+        mut self,
+        lanes: L,
+        bvh: &Bvh,
+        ray: &Ray,
+    ) -> Option<Hit> {
         let beam = Beam::new(lanes, &self);
+        let mut best = None;
         let mut stack = [0u64; N];
         let mut top = 0;
-        let mut next = if self.bvh.boxes.is_empty() { return None } else { 0 };
+        let mut next = if bvh.boxes.is_empty() { return None } else { 0 };
         loop {
             if next & LEAF == 0 {
-                let boxes = self.bvh.boxes.get(next as usize)?;
-                let children = self.bvh.children.get(next as usize)?;
-                let (near, mut hits) = beam.slabs(boxes, self.limit);
+                let boxes = bvh.boxes.get(next as usize)?;
+                let children = bvh.children.get(next as usize)?;
+                let (near, far) = beam.slabs(boxes, self.limit);
+                let mut hits = lanes.le8(near, far);
                 let near = lanes.store8(near);
                 let entry = |hits: u32| {
                     let child = hits.trailing_zeros() as usize & 7;
@@ -162,14 +206,14 @@ impl<'a> Walk<'a> {
                     continue;
                 }
             } else {
-                self.leaf(lanes, &beam, next);
-                if ANY && self.best.is_some() {
-                    return self.best;
+                self.leaf(&beam, bvh, ray, next, &mut best);
+                if ANY && best.is_some() {
+                    return best;
                 }
             }
             next = loop {
                 if top == 0 {
-                    return self.best;
+                    return best;
                 }
                 top -= 1;
                 let entry = stack.get(top).copied()?;
@@ -182,140 +226,142 @@ impl<'a> Walk<'a> {
 
     /// Tests the packets of a leaf.
     #[inline(always)]
-    fn leaf<L: Lanes>(&mut self, lanes: L, beam: &Beam<L>, leaf: u32) {
+    fn leaf<L: Lanes>(&mut self, beam: &Beam<L>, bvh: &Bvh, ray: &Ray, leaf: u32, best: &mut Option<Hit>) {
         let first = (leaf & !(LEAF | PAIR)) as usize;
-        self.packet(lanes, beam, first);
-        if leaf & PAIR != 0 {
-            self.packet(lanes, beam, first + 1);
+        for index in first..=first + usize::from(leaf & PAIR != 0) {
+            let Some(lanes) = bvh.lanes(index) else { return };
+            self.confirm(bvh, ray, lanes.2, beam.inside(lanes), best);
         }
     }
 
+    /// Takes the best hit with the facets of a packet that are in the set.
     #[inline(always)]
-    fn packet<L: Lanes>(&mut self, lanes: L, beam: &Beam<L>, index: usize) {
-        let bvh = self.bvh;
-        let (Some(packet), Some(facets)) = (bvh.packets.get(index), bvh.facets.get(index)) else { return };
-        let (edges, mut inside) = beam.edges(packet);
-        if inside != 0 {
-            let edges = [lanes.store4(edges[0]), lanes.store4(edges[1]), lanes.store4(edges[2])];
-            while inside != 0 {
-                let lane = inside.trailing_zeros() as usize & 3;
-                inside &= inside - 1;
-                self.facet(packet, facets[lane], lane, [edges[0][lane], edges[1][lane], edges[2][lane]]);
-            }
+    pub fn confirm(
+        &mut self,
+        bvh: &Bvh,
+        ray: &Ray,
+        facets: &[u32; LANES],
+        mut set: u32,
+        best: &mut Option<Hit>,
+    ) {
+        while set != 0 {
+            let lane = set.trailing_zeros() as usize & 7;
+            set &= set - 1;
+            self.facet(bvh, ray, facets[lane], best);
         }
     }
 
     /// Takes the hit with one facet where it is better than the best so far.
     #[inline(always)]
-    fn facet(&mut self, packet: &Packet, facet: u32, lane: usize, edges: [f64; 3]) {
-        if facet == self.ray.skip {
-            return;
-        }
-        let [a, b, c, normal] = packet;
-        let origin = self.ray.origin;
-        let moved = [vector(a, lane) - origin, vector(b, lane) - origin, vector(c, lane) - origin];
-        let Some(hit) = self.line.hit(facet, edges, moved, vector(normal, lane)) else { return };
-        let tie = hit.t == self.nearest && self.best.is_some_and(|best| facet < best.facet);
+    fn facet(&mut self, bvh: &Bvh, ray: &Ray, facet: u32, best: &mut Option<Hit>) {
+        let Some(&[a, b, c, normal]) = bvh.solids.get(facet as usize) else { return };
+        let Some(line) = Line::new(ray) else { return };
+        let moved = [a, b, c].map(|corner| Vec3::from_array(corner) - ray.origin);
+        let edges = line.edges(moved.map(|m| line.image(m.to_array())));
+        let Some(hit) = line.hit(facet, edges, moved, Vec3::from_array(normal)) else { return };
+        let tie = hit.t == self.nearest && best.is_some_and(|best| facet < best.facet);
         if hit.t < self.nearest || tie {
             self.shorten(hit.t);
-            self.best = Some(hit);
+            *best = Some(hit);
         }
     }
 }
 
-/// One lane of a packet's row of vectors.
-#[inline(always)]
-fn vector([x, y, z]: &[[f64; 4]; 3], lane: usize) -> Vec3 {
-    Vec3::new(x[lane & 3], y[lane & 3], z[lane & 3])
-}
-
 /// What the lanes need of a ray, in every lane.
-struct Beam<L: Lanes> {
+pub(super) struct Beam<L: Lanes> {
     lanes: L,
-    side: [usize; 3],
+    side: [u8; 3],
     near: [L::F8; 3],
     far: [L::F8; 3],
     inverse: [L::F8; 3],
-    axes: [usize; 3],
-    origin: [L::F4; 3],
-    shear: [L::F4; 2],
+    skip: u32,
+    axes: [u8; 3],
+    origin: [L::F8; 3],
+    shear: [L::F8; 2],
+    error: f32,
 }
 
 impl<L: Lanes> Beam<L> {
     #[inline(always)]
-    fn new(lanes: L, walk: &Walk) -> Self {
-        let origin = walk.ray.origin.to_array();
-        let [first, second, along] = walk.line.axes;
-        let (n, f, i) = (walk.near, walk.far, walk.inverse);
+    pub fn new(lanes: L, walk: &Walk) -> Self {
+        let (n, f, i, o) = (walk.near, walk.far, walk.inverse, walk.origin);
         Beam {
             lanes,
             side: walk.side,
             near: [lanes.splat8(n[0]), lanes.splat8(n[1]), lanes.splat8(n[2])],
             far: [lanes.splat8(f[0]), lanes.splat8(f[1]), lanes.splat8(f[2])],
             inverse: [lanes.splat8(i[0]), lanes.splat8(i[1]), lanes.splat8(i[2])],
-            axes: walk.line.axes,
-            origin: [
-                lanes.splat4(origin.at(first)),
-                lanes.splat4(origin.at(second)),
-                lanes.splat4(origin.at(along)),
-            ],
-            shear: [lanes.splat4(walk.line.shear[0]), lanes.splat4(walk.line.shear[1])],
+            skip: walk.skip,
+            axes: walk.axes,
+            origin: [lanes.splat8(o[0]), lanes.splat8(o[1]), lanes.splat8(o[2])],
+            shear: [lanes.splat8(walk.shear[0]), lanes.splat8(walk.shear[1])],
+            error: walk.error,
         }
     }
 
-    /// Where the ray enters the eight boxes, and which of them it meets before the limit, as bits.
+    /// Where the ray enters the eight boxes, and where it leaves them or is at its limit: meets them, if that is no
+    /// sooner.
     #[inline(always)]
-    fn slabs(&self, boxes: &Boxes, limit: f32) -> (L::F8, u32) {
+    pub fn slabs(&self, boxes: &Boxes, limit: f32) -> (L::F8, L::F8) {
         let lanes = self.lanes;
         let mut near = lanes.splat8(0.0);
         let mut far = lanes.splat8(f32::INFINITY);
         let rays = self.near.iter().zip(&self.far).zip(&self.inverse).zip(&self.side);
-        for ([low, high], (((&start, &end), &inverse), &side)) in boxes.iter().zip(rays) {
-            let (first, last) = if side == 0 { (low, high) } else { (high, low) };
+        for (sides, (((&start, &end), &inverse), &side)) in boxes.iter().zip(rays) {
+            let (first, last) = (&sides[usize::from(side & 1)], &sides[usize::from(side & 1 ^ 1)]);
             let entry = lanes.sub8(lanes.load8(first), start);
             let exit = lanes.sub8(lanes.load8(last), end);
             near = lanes.max8(lanes.mul8(entry, inverse), near);
             far = lanes.min8(lanes.mul8(exit, inverse), far);
         }
         let far = lanes.min8(lanes.mul8(far, lanes.splat8(WIDEN)), lanes.splat8(limit));
-        (near, lanes.le8(near, far))
+        (near, far)
     }
 
-    /// The edge functions of four facets, and which facets may have the ray inside: [`Line::edges`], lane by lane.
+    /// Which of eight facets may have the ray inside, as bits; not the one to skip.
     #[inline(always)]
-    fn edges(&self, packet: &Packet) -> ([L::F4; 3], u32) {
+    pub fn inside(&self, (packet, slack, facets): (&Packet, &Slack, &[u32; LANES])) -> u32 {
         let lanes = self.lanes;
         let [a, b, c] = [self.image(&packet[0]), self.image(&packet[1]), self.image(&packet[2])];
         let edges = [self.cross(c, b), self.cross(a, c), self.cross(b, a)];
-        let least = lanes.min4(lanes.min4(edges[0], edges[1]), edges[2]);
-        let most = lanes.max4(lanes.max4(edges[0], edges[1]), edges[2]);
-        let zero = lanes.splat4(0.0);
-        (edges, lanes.le4(zero, least) | lanes.le4(most, zero))
+        let least = lanes.min8(lanes.min8(edges[0], edges[1]), edges[2]);
+        let most = lanes.max8(lanes.max8(edges[0], edges[1]), edges[2]);
+        let less = lanes.mul8(lanes.load8(slack), lanes.splat8(-self.error));
+        let less = lanes.sub8(less, lanes.splat8(4.0 * self.error * self.error));
+        let more = lanes.sub8(lanes.splat8(0.0), less);
+        (lanes.le8(less, least) | lanes.le8(most, more)) & !lanes.same8(facets, self.skip)
     }
 
     // Methods rather than closures, which are not inlined into code compiled for another instruction set.
 
     #[inline(always)]
-    fn image(&self, corner: &[[f64; 4]; 3]) -> [L::F4; 2] {
+    fn image(&self, corner: &[[f32; 8]; 3]) -> [L::F8; 2] {
         let lanes = self.lanes;
         let [first, second, along] = self.axes;
         let depth = self.moved(corner, along, self.origin[2]);
         [
-            lanes.sub4(self.moved(corner, first, self.origin[0]), lanes.mul4(self.shear[0], depth)),
-            lanes.sub4(self.moved(corner, second, self.origin[1]), lanes.mul4(self.shear[1], depth)),
+            lanes.sub8(self.moved(corner, first, self.origin[0]), lanes.mul8(self.shear[0], depth)),
+            lanes.sub8(self.moved(corner, second, self.origin[1]), lanes.mul8(self.shear[1], depth)),
         ]
     }
 
     #[inline(always)]
-    fn moved(&self, corner: &[[f64; 4]; 3], axis: usize, origin: L::F4) -> L::F4 {
-        let row = if axis < 3 { &corner[axis] } else { &corner[0] };
-        self.lanes.sub4(self.lanes.load4(row), origin)
+    fn moved(&self, corner: &[[f32; 8]; 3], axis: u8, origin: L::F8) -> L::F8 {
+        let row = &corner[usize::from(if axis < 3 { axis } else { 0 })];
+        self.lanes.sub8(self.lanes.load8(row), origin)
     }
 
     #[inline(always)]
-    fn cross(&self, p: [L::F4; 2], q: [L::F4; 2]) -> L::F4 {
-        self.lanes.sub4(self.lanes.mul4(p[0], q[1]), self.lanes.mul4(p[1], q[0]))
+    fn cross(&self, p: [L::F8; 2], q: [L::F8; 2]) -> L::F8 {
+        self.lanes.sub8(self.lanes.mul8(p[0], q[1]), self.lanes.mul8(p[1], q[0]))
     }
+}
+
+/// A vector in f32, and a fourth number to fill the lanes.
+#[inline(always)]
+fn wide(v: Vec3) -> [f32; 4] {
+    let [x, y, z] = v.to_array();
+    [x, y, z, 0.0].map(|x| x as f32)
 }
 
 /// Puts an entry on the stack, which above `bottom` is sorted so that the nearest comes off first.

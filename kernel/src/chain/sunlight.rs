@@ -20,7 +20,13 @@ const MOST_DISC_RAYS: u32 = 1024;
 impl Solved<'_> {
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[inline]
-    pub(super) fn sun_cosine(&self, leg: &Leg, surface: &Surface, sample: Sample, path: &mut Path) -> f64 {
+    pub(super) fn sun_cosine(
+        &self,
+        leg: &Leg<'_>,
+        surface: &Surface,
+        sample: Sample,
+        path: &mut Path,
+    ) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
         let cosine = sun.cosine(surface.normal);
         if cosine <= 0.0 {
@@ -83,7 +89,7 @@ impl Solved<'_> {
     }
 
     /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
-    fn sun_at_stake(&self, leg: &Leg, surface: &Surface, sun: &Sun<'_>) -> f64 {
+    fn sun_at_stake(&self, leg: &Leg<'_>, surface: &Surface, sun: &Sun<'_>) -> f64 {
         let diffuse = self.scene.diffuse(surface.material);
         let mut largest: f64 = 0.0;
         for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
@@ -97,7 +103,7 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn add_images(
         &self,
-        leg: &Leg,
+        leg: &Leg<'_>,
         surface: &Surface,
         sample: Sample,
         to: &mut [f64; MAX_BANDS],
@@ -171,7 +177,7 @@ impl Solved<'_> {
     }
 
     /// The sun in a lobe, evaluated directly: E q(sun, view) V.
-    pub(super) fn add_sun_gloss(&self, leg: &Leg, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
+    pub(super) fn add_sun_gloss(&self, leg: &Leg<'_>, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
         let toward: Vec3 = sun.direction();
         if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
@@ -179,7 +185,7 @@ impl Solved<'_> {
         }
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
         let value = lobe.value(mirrored.dot(toward));
-        let own = terms.mirror_sky.iter_mut().zip(&leg.through).take(self.shape.bands);
+        let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(self.shape.bands);
         own.enumerate().for_each(|(band, (to, through))| *to += through * sun.irradiance(band) * value);
     }
 }

@@ -7,19 +7,22 @@
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
 //! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand
-//! for what is seen.
+//! for what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside
+//! a body ([`crate::inside`]), and counts or not.
 
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
+use crate::inside::inside;
 use crate::math::{Vec3, clamp, frame, pow};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::quarter::{self, QUARTERS};
+use crate::ray::{Hit, Ray};
 use crate::scene::Scene;
 use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
@@ -97,6 +100,20 @@ impl RowSettings {
     /// The most rays of a row.
     pub fn most_rays(&self) -> u32 {
         whole(MOST_FACTOR * f64::from(self.rays))
+    }
+
+    /// The same with half the rays; `None` where a row has the fewest.
+    pub fn fewer(self) -> Option<Self> {
+        (self.rays > FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
+    }
+
+    /// The same with as many rays as make no more than `budget` first rays of so many rows, or the fewest.
+    pub fn within(mut self, rows: usize, budget: u64) -> Self {
+        while u64::from(self.most_rays()).saturating_mul(rows as u64) > budget {
+            let Some(fewer) = self.fewer() else { break };
+            self = fewer;
+        }
+        self
     }
 
     /// Settings for a tolerance: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
@@ -177,12 +194,21 @@ struct Tally {
     /// Rays of each part's parts, and how many of them met a black back first.
     bins: [u32; BINS],
     backs: [u32; BINS],
+    /// Whether rays of a part's part are told apart by where they start, and how many started inside a body.
+    apart: [bool; BINS],
+    inside: [u32; BINS],
 }
 
 impl Tally {
-    /// Which parts of the parts are not inside a body, and their rays; all where none is seen, and then true.
-    fn exposed(&self) -> ([bool; BINS], [u32; BINS], bool) {
-        let mut open = [true; BINS];
+    /// Where some rays of the row met black backs: the parts of the parts of which not all did.
+    fn mixed(&self) -> [bool; BINS] {
+        let some = self.backs != [0; BINS];
+        core::array::from_fn(|bin| some && self.backs.at(bin) < self.bins.at(bin))
+    }
+
+    /// Rays of each part's part that did not start inside a body; all where none did not, and then true.
+    fn exposed(&self) -> ([u32; BINS], bool) {
+        let mut exposed = [0; BINS];
         for part in 0..PARTS {
             let of = |counts: &[u32; BINS], bin: usize| counts.at(part * PARTS + bin);
             let sum = |counts: &[u32; BINS]| (0..PARTS).map(|bin| of(counts, bin)).sum::<u32>();
@@ -192,16 +218,16 @@ impl Tally {
                     few if few < FEWEST / PARTS as u32 => (sum(&self.backs), sum(&self.bins)),
                     rays => (of(&self.backs, bin), rays),
                 };
-                open.set(part * PARTS + bin, !inside(backs, rays));
+                let at = part * PARTS + bin;
+                let seen = match (self.apart[at], inside(backs, rays)) {
+                    (true, _) => self.bins.at(at).saturating_sub(self.inside.at(at)),
+                    (false, true) => 0,
+                    (false, false) => self.bins.at(at),
+                };
+                exposed.set(at, seen);
             }
         }
-        let hidden = open == [false; BINS];
-        if hidden {
-            open = [true; BINS];
-        }
-        let mut exposed = self.bins;
-        exposed.iter_mut().zip(open).filter(|(_, open)| !open).for_each(|(rays, _)| *rays = 0);
-        (open, exposed, hidden)
+        if exposed == [0; BINS] { (self.bins, true) } else { (exposed, false) }
     }
 }
 
@@ -227,18 +253,29 @@ impl Tracer<'_, '_> {
             frame: frame(normal),
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
-        let most = self.most_rays(self.scene.areas()[facet] * self.elements.share(unknown));
-        let mut tally = Tally::default();
+        let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
+        let mut tally = self.rays(&start, most, [false; BINS])?;
+        if self.scene.sides() == 1 && tally.mixed() != [false; BINS] {
+            self.sink.drop_row();
+            tally = self.rays(&start, most, tally.mixed())?;
+        }
+        self.end_row(&tally);
+        Some(())
+    }
+
+    /// As many rays as are needed, at most `most`; those that start inside a body in parts named by `apart` leave no
+    /// record.
+    fn rays(&mut self, start: &Start, most: u32, apart: [bool; BINS]) -> Option<Tally> {
+        let mut tally = Tally { apart, ..Tally::default() };
         let mut goal = (most / 16).max(FEWEST).min(most);
         while tally.rays < goal {
-            self.ray(&start, &mut tally)?;
-            tally.rays += 1;
+            let count = (goal - tally.rays).min(GROUP as u32);
+            self.batch(start, &mut tally, count)?;
             if tally.rays == goal {
                 goal = enough(most, goal, tally.blocked);
             }
         }
-        self.end_row(&tally);
-        Some(())
+        Some(tally)
     }
 
     /// Rays of an element of so much area: the image's mean square error, the sum of a n^-4/3 over all elements, is least
@@ -250,14 +287,15 @@ impl Tracer<'_, '_> {
 
     /// Turns what the parts saw into the row.
     fn end_row(&mut self, tally: &Tally) {
-        let (open, exposed, hidden) = tally.exposed();
+        let (exposed, hidden) = tally.exposed();
         let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
         let share = 1.0 / f64::from(tally.rays);
         // the lesser part of the hemisphere is kept
+        let counted = tally.rays - tally.inside.iter().sum::<u32>();
         let enclosed =
-            self.settings.directional && 2 * (tally.blocked + seen).saturating_sub(tally.rays) > seen;
+            self.settings.directional && !hidden && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
         let dropped = if enclosed { BLOCKED } else { EMPTY };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },
@@ -271,14 +309,16 @@ impl Tracer<'_, '_> {
             (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
         let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen);
+        let exposed_all = seen == tally.rays;
         let finish = |record: Record| {
             let bin = record.gradient[0] as usize % BINS;
-            if !open[bin] || (record.is_escape() && record.word() == dropped) {
+            if exposed[bin] == 0 || (record.is_escape() && record.word() == dropped) {
                 return None;
             }
             let own = record.weight / f64::from(counts[bin / PARTS]);
             let part = bin / PARTS;
-            let gradient = slopes[part].map(|slope| (slope * own) as f32);
+            let gradient =
+                if exposed_all { slopes[part].map(|slope| (slope * own) as f32) } else { [0.0; 2] };
             let first = record.gradient[1] < first_half;
             let difference = if first { mean * record.weight } else { -mean * record.weight };
             let departure = 2.0 * departures[part] * own;
@@ -291,41 +331,75 @@ impl Tracer<'_, '_> {
         self.sink.end_row(stats, finish, Record::join);
     }
 
-    /// Ray number `tally.rays` of a row and its mirror chain.
+    /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
+    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32) -> Option<()> {
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
+        let mut bins = [0; GROUP];
+        let mut hits = [None; GROUP];
+        let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
+        for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
+            (*ray, *bin) = self.ray(start, number);
+        }
+        self.bvh.closest_many(rays, hits);
+        for ((ray, &hit), &bin) in rays.iter().zip(&*hits).zip(&bins) {
+            self.follow(start, tally, *ray, hit, bin)?;
+            tally.rays += 1;
+        }
+        Some(())
+    }
+
+    /// Ray `number` of a row, and the part of a part from which it starts.
     #[inline]
-    fn ray(&mut self, start: &Start, tally: &mut Tally) -> Option<()> {
-        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+    fn ray(&self, start: &Start, number: u32) -> (Ray, usize) {
+        let (part, index) = (number as usize % PARTS, number / PARTS as u32);
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
         let (a, b) = triangle(p, q);
         let bin = part * PARTS + quarter::into(a, b).0;
-        tally.bins[bin] += 1;
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
         let (u, v) = self.elements.in_facet(start.element, a, b);
         let origin = Surface::new(self.scene, start.facet, start.side, u, v);
-        let first = start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz;
+        (origin.leave(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
+    }
+
+    /// What ray number `tally.rays` of a row finds, of which the first hit is known, and its mirror chain.
+    #[inline]
+    fn follow(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        mut ray: Ray,
+        mut met: Option<Hit>,
+        bin: usize,
+    ) -> Option<()> {
+        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+        let sequence = &start.sequences[part];
+        let first = ray.direction;
+        *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
         let mark = [bin as f32, index as f32];
-        let mut ray = origin.leave(first);
         let (mut word, mut weight) = (EMPTY, 1.0);
         let ray_start = self.sink.used();
         loop {
-            let hit = self.bvh.closest(&ray);
             tally.chain_rays += u32::from(word != EMPTY);
-            let Some(hit) = hit else {
+            let Some(hit) = met else {
                 let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
                 return self.sink.push(escape);
             };
+            let surface = Surface::of_hit(self.scene, &hit);
             if word == EMPTY {
+                tally.backs[bin] += u32::from(surface.is_none());
+                if tally.apart[bin] && inside(self.bvh, &ray, self.scene.side_normal(start.facet, start.side))
+                {
+                    tally.inside[bin] += 1;
+                    return Some(());
+                }
                 tally.blocked += 1;
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
             }
-            let Some(surface) = Surface::of_hit(self.scene, &hit) else {
-                tally.backs[bin] += u32::from(word == EMPTY);
-                return Some(());
-            };
+            let Some(surface) = surface else { return Some(()) };
             let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
             if self.glows(surface.material) {
                 self.sink.push(Record::target(target, word, weight, mark))?;
@@ -360,6 +434,7 @@ impl Tracer<'_, '_> {
             word = next;
             weight *= share;
             ray = surface.leave(direction);
+            met = self.bvh.closest(&ray);
         }
     }
 

@@ -121,6 +121,22 @@ impl<'m> Sink<'m> {
         self.used = self.start;
     }
 
+    /// Records of the present row so far.
+    pub fn present(&self) -> usize {
+        self.used - self.start
+    }
+
+    /// Sorts the records of the present row and adds up those that `join` takes for the same, so that a row of many rays
+    /// needs no memory for each; returns how many are left.
+    pub fn fold(&mut self, join: impl Fn(&mut Record, &Record) -> bool) -> usize {
+        let row = self.records.part_mut(self.start..self.used);
+        let words = &self.words;
+        sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
+        let kept = merge(row, join);
+        self.used = self.start + kept;
+        kept
+    }
+
     /// Ends the present row with what `finish` leaves of each record: sorts the records and adds up those that `join`
     /// takes for the same.
     pub fn end_row(

@@ -21,6 +21,8 @@ pub struct Report {
     pub certified: Certified,
     /// The largest part of the estimate.
     pub limited_by: &'static str,
+    /// Rounds in which the image was computed ([`super::Rounds`]); seconds and rays are those of all of them.
+    pub rounds: u32,
     pub facets: usize,
     pub degenerate_facets: usize,
     pub bands: usize,
@@ -68,6 +70,16 @@ pub struct Rays {
     pub primary: u64,
 }
 
+impl Rays {
+    /// Adds those of another round.
+    pub(super) fn add(&mut self, other: &Rays) {
+        self.visibility += other.visibility;
+        self.sun += other.sun;
+        self.chain += other.chain;
+        self.primary += other.primary;
+    }
+}
+
 /// Bytes in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs)]
@@ -89,6 +101,18 @@ pub struct Seconds {
     pub light: f64,
     pub radiosity: f64,
     pub image: f64,
+}
+
+impl Seconds {
+    /// Adds those of another round.
+    pub(super) fn add(&mut self, other: &Seconds) {
+        self.scene += other.scene;
+        self.bvh += other.bvh;
+        self.coupling += other.coupling;
+        self.light += other.light;
+        self.radiosity += other.radiosity;
+        self.image += other.image;
+    }
 }
 
 /// What a distant observer who looks along the camera's direction measures of the whole object.

@@ -1,57 +1,16 @@
 //! The owning layer over the plane model, for programs with a heap: one thread, as the paper's times are.
 
 use crate::arena::Memory;
-use crate::error::{Error, Field};
+use crate::error::Error;
 use crate::plane::image::{self, Seen, Solved, View};
 use crate::plane::light::{self, Light};
-use crate::plane::rows::{self, Method, RowInfo, RowSettings, check_bounces};
-use crate::plane::scene::{Basis, PlaneInput, PlaneScene};
-use crate::plane::solve::{System, bound};
+use crate::plane::rows::{self, RowInfo};
+use crate::plane::scene::{PlaneInput, PlaneScene};
+pub use crate::plane::settings::Settings;
+use crate::plane::solve::System;
 use crate::plane::view::Scratch;
-use crate::policy::Sweeps;
 use std::vec;
 use std::vec::Vec;
-
-/// How a scene is solved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// How the diffuse radiance varies.
-    pub basis: Basis,
-    /// How rows are integrated.
-    pub method: Method,
-    /// Light reflected more often does not count, 1 to 64; `None`: by `cutoff`.
-    pub max_bounces: Option<u32>,
-    /// Chains end where their mirrors leave less than this share.
-    pub cutoff: f64,
-    /// Bound on the solver's error, relative to the brightest light.
-    pub solver: f64,
-    /// Wanted error, relative to the sky: chooses the rays of lobes that have none of their own.
-    pub tolerance: f64,
-}
-
-impl Settings {
-    /// Settings with which bodies that are cut finely enough reach this error, relative to the sky: circles of
-    /// 12 elements at 1e-4 and of 16 at 1e-5 in the two-circle study, more where bodies nearly touch. A tolerance
-    /// beyond 1e-13 to 0.1 is refused by [`solve`].
-    pub fn for_tolerance(tolerance: f64) -> Settings {
-        let t = tolerance.clamp(1e-13, 0.1);
-        let points = if t >= 5e-5 {
-            6
-        } else if t >= 5e-6 {
-            8
-        } else {
-            16
-        };
-        Settings {
-            basis: Basis::Panels(4),
-            method: Method::Split { points },
-            max_bounces: None,
-            cutoff: 0.1 * t,
-            solver: 0.01 * t,
-            tolerance,
-        }
-    }
-}
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,10 +41,8 @@ pub fn solve<R>(
     settings: &Settings,
     with: impl FnOnce(&Solved<'_>, &Report, &mut Scratch<'_>) -> R,
 ) -> Result<R, Error> {
-    let rows =
-        RowSettings { method: settings.method, max_bounces: settings.max_bounces, cutoff: settings.cutoff };
-    check_bounces(&rows)?;
-    check_settings(settings)?;
+    settings.check()?;
+    let rows = settings.rows();
     let mut memory = Memory::new(PlaneScene::bytes(input)?);
     let scene = PlaneScene::new(input, settings.basis, settings.tolerance, memory.bytes_mut())?;
     let cuts = light.cuts().len();
@@ -105,7 +62,10 @@ pub fn solve<R>(
         report.rays = info.iter().map(|i| u64::from(i.rays)).sum();
         report.tail = info.iter().map(|i| i.lost).fold(0.0, f64::max);
         let system = System::new(&scene, &matrix, &direct)?;
-        relax(&system, settings, unknowns, &mut radiance, &mut report)?;
+        let goal = settings.max_bounces.is_none().then_some(settings.solver);
+        let relaxed = system.solve(goal, &mut radiance, &mut vec![0.0; unknowns])?;
+        report.contraction = relaxed.contraction;
+        (report.sweeps, report.solver) = (relaxed.sweeps, relaxed.error);
     }
     let solved = Solved {
         scene: &scene,
@@ -115,58 +75,6 @@ pub fn solve<R>(
         cutoff: settings.cutoff,
     };
     Ok(with(&solved, &report, &mut scratch))
-}
-
-/// Refuses shares that are none.
-fn check_settings(settings: &Settings) -> Result<(), Error> {
-    for value in [settings.cutoff, settings.solver] {
-        if !(0.0..=1.0).contains(&value) {
-            return Err(Error::Range { field: Field::Tolerance, band: 0, value });
-        }
-    }
-    Ok(())
-}
-
-/// Solves the system, level by level or by sweeps.
-fn relax(
-    system: &System<'_>,
-    settings: &Settings,
-    unknowns: usize,
-    radiance: &mut Vec<f64>,
-    report: &mut Report,
-) -> Result<(), Error> {
-    if settings.max_bounces.is_some() {
-        for bounces in 1..=system.levels() {
-            let (lower, to) = radiance.split_at_mut((bounces - 1) * unknowns);
-            system.level(0..unknowns, bounces, lower, &mut to[..unknowns]);
-        }
-        return Ok(());
-    }
-    report.contraction = system.contraction(0..unknowns);
-    let goal = settings.solver.max(1e-15);
-    let mut sweeps = Sweeps::until(report.contraction, goal);
-    let mut next = radiance.clone();
-    // from no light, the first change is the brightest radiance before interreflection
-    let (mut scale, mut before, mut decay) = (0.0, 0.0, f64::INFINITY);
-    while sweeps.more() {
-        let change = system.sweep(0..unknowns, radiance, &mut next);
-        core::mem::swap(radiance, &mut next);
-        scale = f64::max(scale, change);
-        sweeps.took(if scale > 0.0 { change / scale } else { 0.0 })?;
-        report.solver = sweeps.error * scale;
-        if report.contraction >= 1.0 {
-            // polynomials have negative weights: sweeps contract that no row's absolute sum proves to
-            let latest = change / before;
-            report.solver = bound(change, f64::max(latest, decay));
-            decay = latest;
-            if change == 0.0 || report.solver <= goal * scale {
-                break;
-            }
-        }
-        before = change;
-    }
-    report.sweeps = sweeps.done;
-    Ok(())
 }
 
 /// A view's samples.

@@ -1,6 +1,7 @@
 //! Images of the plane model: one line of samples, eq. (15) along each sample's ray.
 
 use crate::error::{Error, Field};
+use crate::index::span;
 use crate::math::{cos, sin};
 use crate::plane::Vec2;
 use crate::plane::light::Light;
@@ -172,8 +173,8 @@ pub fn fill(
     out: &mut [Seen],
     scratch: &mut Scratch<'_>,
 ) -> Result<(), Error> {
-    if out.len() != range.len() {
-        return Err(Error::Length { what: "samples", expected: range.len(), given: out.len() });
+    if out.len() != span(&range) {
+        return Err(Error::Length { what: "samples", expected: span(&range), given: out.len() });
     }
     scratch.check(solved.scene, solved.light.cuts().len())?;
     for (sample, out) in range.zip(out) {

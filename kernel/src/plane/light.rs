@@ -1,6 +1,7 @@
 //! Sky and sun on every unknown, straight and by way of mirrors and lobes: the right-hand side of eq. (12).
 
 use crate::error::{Error, Field};
+use crate::index::{Index, IndexMut, parts, pieces, span};
 use crate::math::{cos, fabs, sin};
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::rows::{Gather, RowSettings, check_bounces, class, gather};
@@ -115,13 +116,13 @@ impl<'a> Light<'a> {
     }
 
     fn cut(&mut self, direction: Vec2) {
-        self.cuts[self.count] = direction;
+        self.cuts.set(self.count, direction);
         self.count += 1;
     }
 
     /// Directions at which what a mirrored ray sees jumps.
     pub fn cuts(&self) -> &[Vec2] {
-        &self.cuts[..self.count]
+        self.cuts.head(self.count)
     }
 
     /// Whether all that escapes brings the same.
@@ -244,7 +245,7 @@ pub fn fill(
     check_bounces(settings)?;
     let classes = classes(settings);
     for (what, given) in [("open shares", open.len()), ("plane light", out.len())] {
-        let expected = range.len() * classes;
+        let expected = span(&range).saturating_mul(classes);
         if given != expected {
             return Err(Error::Length { what, expected, given });
         }
@@ -252,7 +253,7 @@ pub fn fill(
     scratch.check(scene, light.cuts().len())?;
     let closed = light.is_uniform();
     let traced = !closed || light.sun.is_some();
-    for (unknown, (open, out)) in range.zip(open.chunks_exact(classes).zip(out.chunks_exact_mut(classes))) {
+    for (unknown, (open, out)) in range.zip(parts(open, classes).zip(pieces(out, classes))) {
         let sky = if let (Sky::Uniform(radiance), true) = (light.sky, closed) { radiance } else { 0.0 };
         out.iter_mut().zip(open).for_each(|(out, share)| *out = sky * share);
         if traced {

@@ -7,7 +7,7 @@
 use crate::arena::plain_struct;
 use crate::error::{Error, Field};
 use crate::lobe::mean_over_angle;
-use crate::math::{PI, atan, sqrt, tan};
+use crate::math::{PI, atan, clamp, sqrt, tan};
 use crate::plane::{Vec2, cross, turned};
 use crate::scene::MIRROR_AXIS_RATIO;
 
@@ -110,7 +110,7 @@ impl PlaneLobe {
     pub fn place(&self, mirror: Vec2, d: Vec2, visible: &Visible) -> f64 {
         let sine = cross(mirror, d);
         if mirror.dot(d) >= 0.0 {
-            return self.at(sine).clamp(visible.low, visible.high);
+            return clamp(self.at(sine), visible.low, visible.high);
         }
         if sine < 0.0 { visible.low } else { visible.high }
     }

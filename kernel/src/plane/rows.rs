@@ -3,7 +3,8 @@
 
 use crate::arena::plain_struct;
 use crate::error::{Error, Field};
-use crate::math::{floor, sqrt};
+use crate::index::{pieces, span};
+use crate::math::{clamp, floor, sqrt};
 use crate::plane::light::Light;
 use crate::plane::scene::{PlaneScene, Primitive};
 use crate::plane::trace::{Chains, Hit, Leg, Sink, graded, nodes};
@@ -138,11 +139,11 @@ pub fn fill(
 ) -> Result<(), Error> {
     check_bounces(settings)?;
     let (classes, unknowns) = (classes(settings), scene.unknowns());
-    let rows = range.len();
+    let rows = span(&range);
     let size = classes.saturating_mul(unknowns);
     for (what, expected, given) in [
         ("plane matrix", rows.saturating_mul(size), matrix.len()),
-        ("open shares", rows * classes, open.len()),
+        ("open shares", rows.saturating_mul(classes), open.len()),
         ("row statistics", rows, info.len()),
     ] {
         if expected != given {
@@ -150,7 +151,7 @@ pub fn fill(
         }
     }
     scratch.check(scene, 0)?;
-    let outputs = matrix.chunks_exact_mut(size.max(1)).zip(open.chunks_exact_mut(classes)).zip(info);
+    let outputs = pieces(matrix, size).zip(pieces(open, classes)).zip(info);
     for (unknown, ((matrix, open), info)) in range.zip(outputs) {
         matrix.fill(0.0);
         open.fill(0.0);
@@ -250,7 +251,7 @@ impl Station<'_> {
         let mut from = span.from;
         while from < span.to {
             let edge = (-floor(-at) - 1.0).max(low); // the next whole number below
-            let to = if edge > low { self.sine(index, edge / count).clamp(from, span.to) } else { span.to };
+            let to = if edge > low { clamp(self.sine(index, edge / count), from, span.to) } else { span.to };
             let centre = floor(0.5 * (at + edge)) + 0.5;
             let weight = 0.5 * (to - from);
             if weight > 0.0 {

@@ -5,13 +5,19 @@ mod layout;
 
 use crate::arena::{Arena, Need, plain_struct};
 use crate::error::{Error, Field};
-use crate::math::{TAU, asin, atan2, cos, floor, sin};
+use crate::index::{Index, IndexMut};
+use crate::math::{TAU, asin, atan2, clamp, cos, floor, sin};
 use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::stencil::{MAX_ORDER, NODES, Stencil};
 use crate::scene::MIRROR_AXIS_RATIO;
 use check::check;
 use layout::lay_out;
+
+/// What [`Error::Body`] says of a number of elements.
+pub const BODY_ELEMENTS: &str = "elements are not 1 to 2^20";
+/// What [`Error::Body`] says of a radius.
+pub const BODY_RADIUS: &str = "radius is not positive";
 
 /// How a lobe is replaced by rays where a chain meets it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -255,11 +261,12 @@ impl<'m> PlaneScene<'m> {
     /// Bytes for a scene of this input.
     pub fn bytes(input: &PlaneInput<'_>) -> Result<usize, Error> {
         let primitives = input.bodies.iter().map(|b| segments(&b.shape)).fold(0, usize::saturating_add);
-        Need::new()
-            .and::<Primitive>(primitives)
-            .and::<Body>(input.bodies.len())
-            .and::<Material>(input.materials.len())
-            .bytes()
+        PlaneScene::bytes_for(primitives, input.bodies.len(), input.materials.len())
+    }
+
+    /// The same for so many circles and segments, bodies and materials.
+    pub fn bytes_for(primitives: usize, bodies: usize, materials: usize) -> Result<usize, Error> {
+        Need::new().and::<Primitive>(primitives).and::<Body>(bodies).and::<Material>(materials).bytes()
     }
 
     /// Checks the input and lays it out. `tolerance`, 1e-13 to 0.1 of a uniform sky, chooses the rays of lobes that
@@ -290,7 +297,7 @@ impl<'m> PlaneScene<'m> {
         let (mut first, mut elements) = (0, 0u32);
         for (index, (body, kept)) in input.bodies.iter().zip(bodies.iter_mut()).enumerate() {
             let count = segments(&body.shape);
-            *kept = lay_out(body, index, first, &mut elements, &mut primitives[first..first + count])?;
+            *kept = lay_out(body, index, first, &mut elements, primitives.part_mut(first..first + count))?;
             first += count;
         }
         Ok(PlaneScene { primitives, bodies, materials, basis, elements })
@@ -346,7 +353,7 @@ impl<'m> PlaneScene<'m> {
         let (element, node) = (unknown as u32 / order, unknown % order as usize);
         let primitive = self.primitives.partition_point(|p| p.first + p.elements <= element);
         let Some(p) = self.primitives.get(primitive) else { return (0, 0.5) };
-        let x = NODES[order as usize].at[node];
+        let x = NODES.get(order as usize).map_or(0.5, |nodes| nodes.at.as_slice().at(node));
         (primitive, (f64::from(element - p.first) + x) / f64::from(p.elements))
     }
 
@@ -407,25 +414,21 @@ impl<'m> PlaneScene<'m> {
             return Stencil::one(first);
         }
         let below = floor(w);
-        let below = if wraps { below } else { below.clamp(0.0, f64::from(count - 2)) };
+        let below = if wraps { below } else { clamp(below, 0.0, f64::from(count - 2)) };
         let share = w - below;
         let wrapped = |i: f64| {
             let i = if i < 0.0 { i + f64::from(count) } else { i };
             let i = if i >= f64::from(count) { i - f64::from(count) } else { i };
             first + i as u32
         };
-        let mut stencil = Stencil::NONE;
-        stencil.len = 2;
-        stencil.unknowns[..2].copy_from_slice(&[wrapped(below), wrapped(below + 1.0)]);
-        stencil.weights[..2].copy_from_slice(&[1.0 - share, share]);
-        stencil
+        Stencil::two([wrapped(below), wrapped(below + 1.0)], [1.0 - share, share])
     }
 
     /// The elements that follow one another smoothly around `p`: first, count, and whether they close.
     fn run(&self, p: &Primitive) -> (u32, u32, bool) {
         match self.bodies.get(p.body as usize) {
             Some(body) if p.smooth == 1 => {
-                let parts = &self.primitives[body.first as usize..(body.first + body.count) as usize];
+                let parts = self.primitives.part(body.first as usize..(body.first + body.count) as usize);
                 let first = parts.first().map_or(0, |q| q.first);
                 (first, parts.iter().map(|q| q.elements).sum(), body.closed == 1)
             }

@@ -2,10 +2,24 @@
 //! independent, so that any split gives the same bits, and the change of a sweep bounds the error.
 
 use crate::error::Error;
+use crate::index::copy;
 use crate::math::fabs;
 use crate::plane::scene::PlaneScene;
+use crate::policy::Sweeps;
 pub use crate::radiosity::{bound, sweeps};
 use core::ops::Range;
+
+/// How [`System::solve`] went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Relaxed {
+    /// Contraction of a sweep; 0 where reflections are told apart.
+    pub contraction: f64,
+    /// Sweeps made.
+    pub sweeps: u32,
+    /// Bound on the error of all radiances: certified where the contraction is below 1, else by the sweeps' observed
+    /// decay.
+    pub error: f64,
+}
 
 /// Everything that stays fixed while the system is solved.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +94,64 @@ impl<'a> System<'a> {
         }
     }
 
+    /// Solves the system to `radiance` (as many values as [`System::levels`] times the unknowns, all 0), with
+    /// `scratch` for as many values as unknowns: by sweeps until the error is at most `goal` of the brightest light,
+    /// or without a goal level by level, one for each number of reflections.
+    ///
+    /// # Errors
+    /// [`Error::Length`]; [`Error::Diverges`] where a closed part of the scene reflects all light.
+    pub fn solve(
+        &self,
+        goal: Option<f64>,
+        radiance: &mut [f64],
+        scratch: &mut [f64],
+    ) -> Result<Relaxed, Error> {
+        for (what, expected, given) in [
+            ("plane radiances", self.unknowns * self.classes, radiance.len()),
+            ("plane scratch", self.unknowns, scratch.len()),
+        ] {
+            if expected != given {
+                return Err(Error::Length { what, expected, given });
+            }
+        }
+        let Some(goal) = goal else {
+            for bounces in 1..=self.classes {
+                let at = ((bounces - 1) * self.unknowns).min(radiance.len());
+                let (lower, to) = radiance.split_at_mut(at);
+                self.level(0..self.unknowns, bounces, lower, to);
+            }
+            return Ok(Relaxed::default());
+        };
+        let goal = goal.max(1e-15);
+        let mut relaxed = Relaxed { contraction: self.contraction(0..self.unknowns), ..Relaxed::default() };
+        let mut sweeps = Sweeps::until(relaxed.contraction, goal);
+        let (mut from, mut to) = (&mut *radiance, &mut *scratch);
+        // from no light, the first change is the brightest radiance before interreflection
+        let (mut scale, mut before, mut decay) = (0.0, 0.0, f64::INFINITY);
+        while sweeps.more() {
+            let change = self.sweep(0..self.unknowns, from, to);
+            core::mem::swap(&mut from, &mut to);
+            scale = f64::max(scale, change);
+            sweeps.took(if scale > 0.0 { change / scale } else { 0.0 })?;
+            relaxed.error = sweeps.error * scale;
+            if relaxed.contraction >= 1.0 {
+                // polynomials have negative weights: sweeps contract that no row's absolute sum proves to
+                let latest = change / before;
+                relaxed.error = bound(change, f64::max(latest, decay));
+                decay = latest;
+                if change == 0.0 || relaxed.error <= goal * scale {
+                    break;
+                }
+            }
+            before = change;
+        }
+        relaxed.sweeps = sweeps.done;
+        if sweeps.done % 2 == 1 {
+            copy(radiance, scratch);
+        }
+        Ok(relaxed)
+    }
+
     fn part(&self, unknown: usize, class: usize) -> &'a [f64] {
         let at = (unknown * self.classes + class) * self.unknowns;
         self.matrix.get(at..at + self.unknowns).unwrap_or(&[])
@@ -94,9 +166,9 @@ impl<'a> System<'a> {
 /// Scalar product in four lanes.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (a, b) in a4.zip(b4) {
+    let ((a4, a), (b4, b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let rest: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+    for (a, b) in a4.iter().zip(b4) {
         for (lane, (x, y)) in lanes.iter_mut().zip(a.iter().zip(b)) {
             *lane += x * y;
         }

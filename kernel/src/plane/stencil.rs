@@ -34,16 +34,24 @@ impl Stencil {
         stencil
     }
 
+    /// Two unknowns.
+    pub(crate) fn two(unknowns: [u32; 2], weights: [f64; 2]) -> Stencil {
+        let ([a, b], [x, y]) = (unknowns, weights);
+        Stencil { unknowns: [a, b, 0, 0, 0, 0], weights: [x, y, 0.0, 0.0, 0.0, 0.0], len: 2 }
+    }
+
     /// Lagrange's polynomials of the element's Gauss points at `x`.
     #[inline]
     pub(crate) fn panel(order: usize, element: u32, x: f64) -> Stencil {
-        let nodes = &NODES[order];
         let mut stencil = Stencil::NONE;
+        let Some(nodes) = NODES.get(order) else { return stencil };
         stencil.len = order;
-        for k in 0..order {
-            let others = (0..order).filter(|&j| j != k).map(|j| x - nodes.at[j]);
-            stencil.unknowns[k] = element * order as u32 + k as u32;
-            stencil.weights[k] = others.fold(nodes.scale[k], |product, d| product * d);
+        let places = stencil.unknowns.iter_mut().zip(&mut stencil.weights).zip(&nodes.scale);
+        for (k, ((unknown, weight), scale)) in places.enumerate().take(order) {
+            let others =
+                nodes.at.iter().enumerate().take(order).filter(|(j, _)| *j != k).map(|(_, at)| x - at);
+            *unknown = element * order as u32 + k as u32;
+            *weight = others.fold(*scale, |product, d| product * d);
         }
         stencil
     }

@@ -2,9 +2,11 @@
 
 use crate::arena::{Arena, Need, plain_struct};
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::math::sqrt;
 use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
 use crate::plane::{Vec2, cross, length, toward};
+use crate::sort::sort;
 
 plain_struct! {
     /// A part of the half circle: directions whose sines to the normal are from `from` to `to`.
@@ -112,25 +114,25 @@ pub fn sweep<'s>(
             if let Some((from, to)) = extent(p, x, n, body.closed == 1)
                 && to > from
             {
-                mine.events[count] = Event { at: from, primitive: index, begins: 1 };
-                mine.events[count + 1] = Event { at: to, primitive: index, begins: 0 };
+                mine.events.set(count, Event { at: from, primitive: index, begins: 1 });
+                mine.events.set(count + 1, Event { at: to, primitive: index, begins: 0 });
                 count += 2;
             }
         }
     }
     for cut in cuts.iter().filter(|cut| cut.dot(n) > 0.0) {
-        mine.events[count] = Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 };
+        mine.events.set(count, Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 });
         count += 1;
     }
-    let events = &mut mine.events[..count];
-    events.sort_unstable_by(|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
+    let events = mine.events.head_mut(count);
+    sort(events, &|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
     let spans = if count > 0 {
         walk(scene, x, n, events, mine.active, mine.spans)
     } else {
-        mine.spans[0] = Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 };
+        mine.spans.set(0, Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 });
         1
     };
-    Some((&mine.spans[..spans], rest))
+    Some((mine.spans.head(spans), rest))
 }
 
 /// Walks from silhouette to silhouette and keeps what begins and ends.
@@ -147,8 +149,8 @@ fn walk(
     for event in events.iter().chain(core::iter::once(&end)) {
         let to = event.at.clamp(-1.0, 1.0);
         if to - from > 1e-15 {
-            let primitive = nearest(scene, x, toward(n, 0.5 * (from + to)), &active[..live]);
-            spans[count] = Span { from, to, primitive, unused: 0 };
+            let primitive = nearest(scene, x, toward(n, 0.5 * (from + to)), active.head(live));
+            spans.set(count, Span { from, to, primitive, unused: 0 });
             count += 1;
             from = to;
         }
@@ -156,11 +158,11 @@ fn walk(
             continue;
         }
         if event.begins == 1 {
-            active[live] = event.primitive;
+            active.set(live, event.primitive);
             live += 1;
-        } else if let Some(at) = active[..live].iter().position(|&p| p == event.primitive) {
-            active.swap(at, live - 1);
+        } else if let Some(at) = active.head(live).iter().position(|&p| p == event.primitive) {
             live -= 1;
+            active.set(at, active.at(live));
         }
     }
     count

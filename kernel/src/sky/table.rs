@@ -2,7 +2,7 @@
 
 use super::{LARGEST, SkyTable};
 use crate::error::{Error, Field};
-use crate::index::Index;
+use crate::index::{Index, parts};
 use crate::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, clamp, cos, fabs, floor, sin, sqrt, unit};
 use crate::quadrature::rule;
 
@@ -65,7 +65,7 @@ impl<'a> Table<'a> {
             1 => factors.iter().fold(0.0, |largest: f64, factor| largest.max(*factor)),
             _ => factors.get(band).copied().unwrap_or(0.0),
         };
-        for sample in input.radiance.chunks_exact(input.bands.max(1)) {
+        for sample in parts(input.radiance, input.bands) {
             for (band, &value) in sample.iter().enumerate() {
                 let value = f64::from(value);
                 if !(value >= 0.0 && value.is_finite()) {
@@ -123,7 +123,7 @@ impl<'a> Table<'a> {
     /// Largest sample per band.
     pub(super) fn largest(&self, out: &mut [f64]) {
         self.each_band(out, |sums| {
-            for sample in self.samples.chunks_exact(self.bands.max(1)) {
+            for sample in parts(self.samples, self.bands) {
                 for (largest, &value) in sums.iter_mut().zip(sample) {
                     *largest = largest.max(f64::from(value));
                 }
@@ -168,9 +168,10 @@ impl<'a> Table<'a> {
         });
         let mut start = 0.5 * size - atan2(y, x);
         start -= TAU * floor((start + PI) / TAU);
+        let mut rings = Rings { rings: [Ring::default(); 48], count: 0 };
         self.each_band(out, |sums| {
             for gap in 0..=self.rows {
-                let rings = Rings::new(self.rows, gap, across, height, points);
+                rings.fill(self.rows, gap, across, height, points);
                 if rings.outer() > 0.0 {
                     let rows = [self.row(gap.saturating_sub(1)), self.row(gap.min(self.rows - 1))];
                     self.add_gap(&rings, rows, start, size, &moments, sums);
@@ -228,14 +229,14 @@ impl<'a> Table<'a> {
 impl Rings {
     /// The rings of gap `gap` (0: between the zenith and the first row; `rows`: between the last row and the
     /// nadir) for a normal of the given horizontal length and height.
-    fn new(rows: usize, gap: usize, across: f64, height: f64, points: usize) -> Rings {
+    fn fill(&mut self, rows: usize, gap: usize, across: f64, height: f64, points: usize) {
         let step = PI / rows as f64;
         let top = if gap == 0 { FRAC_PI_2 } else { FRAC_PI_2 - (gap as f64 - 0.5) * step };
         let bottom = if gap == rows { -FRAC_PI_2 } else { FRAC_PI_2 - (gap as f64 + 0.5) * step };
         // the plane's horizon lies between these elevations
         let turn = atan2(across, fabs(height));
         let bounds = [top, turn.min(top).max(bottom), (-turn).min(top).max(bottom), bottom];
-        let mut set = Rings { rings: [Ring::default(); 48], count: 0 };
+        self.count = 0;
         let (nodes, weights) = rule(points);
         for panel in bounds.windows(2) {
             let &[from, to] = panel else { continue };
@@ -248,13 +249,12 @@ impl Rings {
                 let cosine = cos(elevation);
                 let weight = (from - to) * weight * cosine;
                 let shares = [weight * (1.0 - below), weight * below];
-                if let Some(ring) = set.rings.get_mut(set.count) {
+                if let Some(ring) = self.rings.get_mut(self.count) {
                     *ring = Ring::new(height * sin(elevation), across * cosine, shares);
-                    set.count += 1;
+                    self.count += 1;
                 }
             }
         }
-        set
     }
 
     fn iter(&self) -> impl Iterator<Item = &Ring> {

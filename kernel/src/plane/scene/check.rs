@@ -1,7 +1,8 @@
 //! What can be wrong with a scene.
 
-use super::{BodyInput, PlaneGloss, PlaneInput, RaySet, Shape, segments};
+use super::{BODY_ELEMENTS, BODY_RADIUS, BodyInput, PlaneGloss, PlaneInput, RaySet, Shape, segments};
 use crate::error::{Error, Field};
+use crate::index::Index;
 use crate::math::fabs;
 use crate::plane::{Vec2, length};
 
@@ -62,7 +63,7 @@ fn sane(x: f64) -> bool {
 fn check_body(body: usize, input: &BodyInput<'_>) -> Result<(), Error> {
     let fault = |what| Err(Error::Body { body, what });
     if !(1..=1 << 20).contains(&input.elements) {
-        return fault("elements are not 1 to 2^20");
+        return fault(BODY_ELEMENTS);
     }
     match input.shape {
         Shape::Circle { centre, radius } => {
@@ -70,7 +71,7 @@ fn check_body(body: usize, input: &BodyInput<'_>) -> Result<(), Error> {
                 return fault("a value is not finite or beyond 1e100");
             }
             if radius <= 1e-100 {
-                return fault("radius is not positive");
+                return fault(BODY_RADIUS);
             }
         }
         Shape::Polyline { points, closed, .. } => {
@@ -80,9 +81,9 @@ fn check_body(body: usize, input: &BodyInput<'_>) -> Result<(), Error> {
             if points.len() < if closed { 3 } else { 2 } {
                 return fault("too few points");
             }
-            let next = |i: usize| points[(i + 1) % points.len()];
+            let next = |i: usize| if i + 1 < points.len() { points.at(i + 1) } else { points.at(0) };
             if (0..segments(&input.shape))
-                .any(|i| length(Vec2::from(next(i)) - Vec2::from(points[i])) <= 1e-100)
+                .any(|i| length(Vec2::from(next(i)) - Vec2::from(points.at(i))) <= 1e-100)
             {
                 return fault("two successive points coincide");
             }

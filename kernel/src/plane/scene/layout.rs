@@ -2,6 +2,7 @@
 
 use super::{Body, BodyInput, Primitive, Shape, segments};
 use crate::error::Error;
+use crate::index::Index;
 use crate::plane::{Vec2, length};
 
 /// Lays out one body's primitives; counts its elements on.
@@ -46,7 +47,8 @@ pub(super) fn lay_out(
 /// Segment `i` of a polyline with its normals.
 fn segment(shape: &Shape<'_>, points: &[[f64; 2]], i: usize) -> Primitive {
     let (n, count) = (points.len(), segments(shape));
-    let ends = |i: usize| (Vec2::from(points[i]), Vec2::from(points[(i + 1) % n]));
+    let ends =
+        |i: usize| (Vec2::from(points.at(i)), Vec2::from(points.at(if i + 1 < n { i + 1 } else { 0 })));
     let normal = |i: usize| {
         let (a, b) = ends(i);
         let d = b - a;

@@ -1,0 +1,66 @@
+//! Images that come out worse than asked are computed again, more finely.
+
+use super::{Rays, Report, Seconds};
+use crate::policy;
+
+/// The rounds of one image. Each computes geometry, light and image to [`Rounds::tolerance`], and asks
+/// [`Rounds::again`] whether there is to be another.
+///
+/// ```
+/// # use blik_kernel::{camera::*, host::*, scene::*, sky::*};
+/// # let material = MaterialInput { diffuse: &[0.5], specular: &[0.0], emission: &[0.0], gloss: None };
+/// # let input = SceneInput { vertices: &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], facets: &[[0, 1, 2]],
+/// #     facet_materials: &[], normals: &[], facet_normals: &[], materials: &[material], two_sided: false, bands: 1 };
+/// # let camera = CameraInput { projection: Projection::Orthographic { height: 1.0 }, eye: [0.3, 0.3, 1.0],
+/// #     target: [0.3, 0.3, 0.0], up: [0.0, 1.0, 0.0], columns: 4, rows: 4, sampling: Sampling::Centre };
+/// # let sky = SkyInput { model: SkyModel::Uniform, radiance: &[1.0], ground: &[0.0], up: [0.0, 0.0, 1.0] };
+/// let host = Host::new(1)?;
+/// let mut rounds = Rounds::new(2e-3);
+/// let mut memory = GeometryMemory::default();
+/// let image = loop {
+///     let settings = Settings { tolerance: rounds.tolerance(), ..Settings::default() };
+///     let geometry = host.geometry(&mut memory, &input, &settings)?;
+///     let lit = host.light(&geometry, Some(&sky), None)?;
+///     let mut image = host.image(&lit, &camera, false)?;
+///     if !rounds.again(&mut image.report) {
+///         break image;
+///     }
+/// };
+/// assert!(image.report.tolerance_met && image.report.tolerance == 2e-3);
+/// # Ok::<(), blik_kernel::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Rounds {
+    asked: f64,
+    tolerance: f64,
+    done: u32,
+    seconds: Seconds,
+    rays: Rays,
+}
+
+impl Rounds {
+    /// Rounds of an image whose error is to be `tolerance`.
+    pub fn new(tolerance: f64) -> Rounds {
+        Rounds { asked: tolerance, tolerance, done: 0, seconds: Seconds::default(), rays: Rays::default() }
+    }
+
+    /// What the present round is to be computed to.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
+    /// Whether another round is wanted after one with this report. The report becomes that of all rounds, against the
+    /// error that was asked for.
+    pub fn again(&mut self, report: &mut Report) -> bool {
+        self.done += 1;
+        self.seconds.add(&report.seconds);
+        self.rays.add(&report.rays);
+        report.tolerance = self.asked;
+        report.tolerance_met = report.error_estimate <= self.asked;
+        (report.seconds, report.rays, report.rounds) = (self.seconds, self.rays, self.done);
+        let next =
+            policy::again(self.asked, self.tolerance, report.error_estimate, report.limited_by, self.done);
+        self.tolerance = next.unwrap_or(self.tolerance);
+        next.is_some()
+    }
+}
