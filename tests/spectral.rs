@@ -12,7 +12,7 @@ use support::scenes;
 use support::twin::Material;
 
 /// A corner of a diffuse floor and two mirrors whose reflectances differ by band and from each other in each band;
-/// sky and sun differ by band too.
+/// sky and sun differ by band too. The sun is a point: of penumbrae all bands share the rays that the worst asks for.
 ///
 /// The diffuse reflectance alone is the same in all bands: rays and elements follow from the largest.
 fn scene() -> Case {
@@ -23,7 +23,7 @@ fn scene() -> Case {
     ];
     Case::new(scenes::corner(2), &materials)
         .sky(SkyOf::new(SkyModel::Gradient, &[1.0, 0.6, 0.8], &[0.2, 0.5, 0.1]))
-        .sun(SunOf::new([0.5, 0.7, 0.9], &[2.0, 0.5, 1.0], 0.5))
+        .sun(SunOf::new([0.5, 0.7, 0.9], &[2.0, 0.5, 1.0], 0.0))
 }
 
 /// One band of the case.

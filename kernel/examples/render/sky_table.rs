@@ -45,7 +45,19 @@ pub fn read(path: &Path, bands: usize) -> Outcome<Table> {
     }
 }
 
+/// The crate multiplies a file's shape without a look at its size.
+fn shape_fits(bytes: &[u8]) -> bool {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(1 << 16)]);
+    let shape = head.split_once("shape").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
+    let sizes =
+        shape.map_or("", |(inside, _)| inside).split(',').filter_map(|n| n.trim().parse::<usize>().ok());
+    sizes.into_iter().try_fold(1usize, |all, n| all.checked_mul(n)).is_some_and(|n| n <= bytes.len())
+}
+
 fn npy(bytes: &[u8]) -> Result<Table, String> {
+    if !shape_fits(bytes) {
+        return Err("expected a shape that fits the file's size".into());
+    }
     let file = npyz::NpyFile::new(bytes).map_err(|e| e.to_string())?;
     let shape: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
     let (rows, columns, bands) = match shape[..] {

@@ -202,7 +202,7 @@ struct Tally {
 impl Tally {
     /// Where some rays of the row met black backs: the parts of the parts of which not all did.
     fn mixed(&self) -> [bool; BINS] {
-        let some = self.backs != [0; BINS];
+        let some = self.backs.iter().any(|b| *b > 0);
         core::array::from_fn(|bin| some && self.backs.at(bin) < self.bins.at(bin))
     }
 
@@ -227,7 +227,7 @@ impl Tally {
                 exposed.set(at, seen);
             }
         }
-        if exposed == [0; BINS] { (self.bins, true) } else { (exposed, false) }
+        if exposed.iter().all(|e| *e == 0) { (self.bins, true) } else { (exposed, false) }
     }
 }
 
@@ -255,9 +255,10 @@ impl Tracer<'_, '_> {
         };
         let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
         let mut tally = self.rays(&start, most, [false; BINS])?;
-        if self.scene.sides() == 1 && tally.mixed() != [false; BINS] {
+        let mixed = tally.mixed();
+        if self.scene.sides() == 1 && mixed.contains(&true) {
             self.sink.drop_row();
-            tally = self.rays(&start, most, tally.mixed())?;
+            tally = self.rays(&start, most, mixed)?;
         }
         self.end_row(&tally);
         Some(())

@@ -21,6 +21,13 @@ use crate::failure::{Failure, Outcome};
 pub fn read(path: &Path, bytes: &[u8]) -> Outcome<Mesh> {
     let fail = |e: &dyn std::fmt::Display| Failure::at(path, e);
     let json = if bytes.starts_with(b"glTF") {
+        // the crate takes the head's 12 bytes off the length that it tells
+        let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+        if length < 12 {
+            return Err(fail(&format_args!(
+                "expected a length of at least 12 bytes in the head, got {length}"
+            )));
+        }
         gltf::Glb::from_slice(bytes).map_err(|e| fail(&e))?.json.into_owned()
     } else {
         bytes.to_vec()
