@@ -8,7 +8,7 @@
 //!
 //! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand
 //! for what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside
-//! a body ([`crate::inside`]), and counts or not.
+//! a body, and counts or not.
 
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
