@@ -49,7 +49,7 @@ pub struct blik_plane_scene_info {
     pub bytes: usize,
 }
 
-/// A ray for `blik_plane_first_hits` and `blik_plane_radiance`.
+/// A ray for blik_plane_first_hits and blik_plane_radiance.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_ray {
