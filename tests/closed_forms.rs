@@ -375,6 +375,7 @@ fn under_an_opening_in_the_roof() {
 }
 
 #[test]
+#[ignore = "takes most of a minute: run by hand"]
 fn the_mean_illuminance_of_a_closed_room() {
     // Energy: what is emitted is absorbed, so the mean of all that arrives is phi/(S (1 - rho)) in any closed room
     // of one reflectance, of which phi/S is direct. Here a cube of 96 m2, its floor emitting 10,000 lm.
