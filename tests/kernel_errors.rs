@@ -8,6 +8,7 @@ use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, MAX_RESOLUTION, Projection, Sampling};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
+use blik_kernel::facing::Facing;
 use blik_kernel::form_factor::{Convex, visible_point_to_polygon};
 use blik_kernel::host::{GeometryMemory, Host, Settings};
 use blik_kernel::image::{self, Target};
@@ -387,7 +388,8 @@ fn outputs_of_the_wrong_size() {
         let mut trees = vec![0; Cut::bytes(solved.scene.facets(), 1e-3).unwrap()];
         let mut cut = Cut::new(solved.scene, 1e-3, &mut trees).unwrap();
         let (work, _) = cut.work();
-        let error = work.probe(solved.scene, solved.bvh, 16, 1e-3, 0..6, &mut values).unwrap_err();
+        let error =
+            work.probe(solved.scene, solved.bvh, &Facing::NONE, (16, 1e-3), 0..6, &mut values).unwrap_err();
         is(error, Error::Length { what: "unevenness", expected: 6, given: 5 }, &["unevenness"]);
         assert_eq!(values, [7.0; 5]);
     });

@@ -14,6 +14,7 @@ use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::coupling::rows::{self, RowSettings};
 use blik_kernel::coupling::{Block, Coupling, sink};
 use blik_kernel::element::Elements;
+use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Target};
 use blik_kernel::light::{self, Light, Shape};
 use blik_kernel::radiosity::System;
@@ -154,11 +155,15 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         short("tree", bytes, |memory| Bvh::build_obvhs(corners, areas, Isa::BASELINE, memory).err());
         let mut memory = vec![0; bytes];
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
+        let bytes = Facing::bytes(&scene).unwrap();
+        short("planes", bytes, |memory| Facing::new(&scene, &bvh, Isa::BASELINE, memory).err());
         short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| Cut::new(&scene, 1e-2, memory).err());
         let mut trees = vec![0; Cut::bytes(facets, 1e-2).unwrap()];
         let mut cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();
         let (work, _) = cut.work();
-        wrong("unevenness", facets, f64::MAX, |out| work.probe(&scene, &bvh, 16, 1e-2, 0..facets, out).err());
+        wrong("unevenness", facets, f64::MAX, |out| {
+            work.probe(&scene, &bvh, &Facing::NONE, (16, 1e-2), 0..facets, out).err()
+        });
         let bytes = Elements::bytes(&cut).unwrap();
         short("elements", bytes, |memory| Elements::new(&scene, &cut, memory).err());
     });
@@ -190,7 +195,7 @@ fn coupling_and_beams_refuse_memory_that_holds_no_row() {
         let (scene, elements, n) = (system.scene, system.elements, system.elements.unknowns());
         let beams = BeamSettings::new(scene, system.light.sun.as_ref().unwrap(), 1000.0, 1e-3, 10);
         let mut fills: [Box<Fill<'_>>; 2] = [
-            Box::new(|memory| rows::fill(scene, bvh, elements, settings, 0..n, memory)),
+            Box::new(|memory| rows::fill(scene, bvh, elements, &Facing::NONE, settings, 0..n, memory)),
             Box::new(|memory| {
                 let (sun, facets) = (system.light.sun.as_ref().unwrap(), scene.facets());
                 beam::fill(scene, bvh, elements, sun, &beams, 0..facets, memory)

@@ -11,6 +11,7 @@ use blik_kernel::coupling::pack::{move_down, pack};
 use blik_kernel::coupling::rows::{RowSettings, fill};
 use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN, sink};
 use blik_kernel::element::Elements;
+use blik_kernel::facing::Facing;
 use blik_kernel::subdivide::{self, Cut};
 use blik_kernel::{Error, policy};
 use core::ffi::c_void;
@@ -159,6 +160,15 @@ impl Cutter {
         Ok(taken)
     }
 
+    /// Reserved at the end, until all else is made.
+    fn take_back(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
+        let size = size.next_multiple_of(ALIGNMENT);
+        let left = self.size.checked_sub(size);
+        self.size = left.ok_or(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(size, self.size))?;
+        // SAFETY: within the caller's memory, and what is left ends before it.
+        Ok(unsafe { core::slice::from_raw_parts_mut(self.start.add(self.size), size) })
+    }
+
     /// Lent until the next use: memory that nothing else holds.
     fn lend<'a>(&self) -> &'a mut [u8] {
         // SAFETY: within the caller's memory; callers drop it before they take.
@@ -179,6 +189,7 @@ fn element_bytes(base: &blik_scene, tolerance: f64) -> Result<usize, blik_error>
 /// How finely each facet is cut.
 fn cut<'s>(
     base: &blik_scene,
+    facing: &Facing<'_>,
     settings: &Settings,
     runner: &mut Runner,
     scratch: &'s mut [u8],
@@ -189,7 +200,7 @@ fn cut<'s>(
     loop {
         let (work, unevenness) = cut.work();
         runner.rows(unevenness, 1, PROBING, |range, out| {
-            work.probe(&base.scene, &base.bvh, probing, tolerance, range, out).map(|_| ())
+            work.probe(&base.scene, &base.bvh, facing, (probing, tolerance), range, out).map(|_| ())
         })?;
         if !cut.refine(&base.scene) {
             return Ok(cut);
@@ -206,6 +217,7 @@ fn piece(rows: usize) -> usize {
 /// Makes the elements in the caller's memory.
 fn elements(
     base: &blik_scene,
+    facing: &Facing<'_>,
     settings: &Settings,
     runner: &mut Runner,
     cutter: &mut Cutter,
@@ -216,7 +228,7 @@ fn elements(
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
     let (_, scratch) = whole.split_at_mut_checked(keep).ok_or(short)?;
-    let cut = cut(base, settings, runner, scratch)?;
+    let cut = cut(base, facing, settings, runner, scratch)?;
     let bytes = Elements::bytes(&cut)?.next_multiple_of(ALIGNMENT);
     if bytes > keep {
         return Err(short.sizes(bytes + scratch_bytes, cutter.size));
@@ -239,6 +251,7 @@ struct Spot {
 struct Filler<'a> {
     base: &'a blik_scene,
     elements: &'a Elements<'static>,
+    facing: &'a Facing<'a>,
     rows: &'a RowSettings,
     /// Memory for the blocks.
     start: Start<u8>,
@@ -266,13 +279,20 @@ impl Filler<'_> {
             let size = wanted.min(region.end.saturating_sub(at));
             // SAFETY: within this lane's region, which no other lane touches, behind its finished blocks.
             let memory = unsafe { core::slice::from_raw_parts_mut(self.start.at(at), size) };
-            let done =
-                match fill(&self.base.scene, &self.base.bvh, self.elements, self.rows, next..until, memory) {
-                    Ok(done) => done,
-                    // the next round gives the rest more memory
-                    Err(Error::BufferTooSmall { .. }) => return Ok(()),
-                    Err(error) => return Err(error),
-                };
+            let done = match fill(
+                &self.base.scene,
+                &self.base.bvh,
+                self.elements,
+                self.facing,
+                self.rows,
+                next..until,
+                memory,
+            ) {
+                Ok(done) => done,
+                // the next round gives the rest more memory
+                Err(Error::BufferTooSmall { .. }) => return Ok(()),
+                Err(error) => return Err(error),
+            };
             records = 64.max(Block::open(memory)?.records() / done.max(1) + 16);
             let size = pack(memory)?.next_multiple_of(ALIGNMENT);
             if !note(Spot { first: next, rows: done, at, size }) {
@@ -400,7 +420,8 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     let unknowns = subdivide::most_elements(base.scene.facets(), settings.tolerance) * base.scene.sides();
     let row = sink::bytes(piece(unknowns), 64, policy::unmerged(&rows), base.scene.bands())?;
     let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
-    let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance)?, table, row];
+    let planes = Facing::bytes(&base.scene)? + ALIGNMENT;
+    let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
 
@@ -431,7 +452,9 @@ fn build(
     }
     let (place, rest) = place::<blik_coupling>(memory)?;
     let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) };
-    let elements = elements(base, settings, runner, &mut cutter)?;
+    let planes = cutter.take_back(Facing::bytes(&base.scene)?)?;
+    let facing = Facing::new(&base.scene, &base.bvh, base.bvh.isa(), planes)?;
+    let elements = elements(base, &facing, settings, runner, &mut cutter)?;
     let mut rows = settings.rows_within(base, elements.unknowns());
     let most = most_blocks(elements.unknowns());
     let spots = table(&mut cutter, most, Spot::default())?;
@@ -440,8 +463,9 @@ fn build(
     let (used, end) = loop {
         let (elements, rows_now) = (&elements, &rows);
         let start = Start(cutter.start);
+        let (facing, spots) = (&facing, &mut *spots);
         let mut filler =
-            Filler { base, elements, rows: rows_now, start, size, spots: &mut *spots, used: 0, end: 0 };
+            Filler { base, elements, facing, rows: rows_now, start, size, spots, used: 0, end: 0 };
         let Err(error) = filler.run(runner) else { break (filler.used, filler.end) };
         if error.status != BLIK_ERROR_BUFFER_TOO_SMALL {
             return Err(error);
@@ -616,9 +640,12 @@ mod owned {
         settings: &Settings,
         runner: &mut Runner,
     ) -> Result<*mut blik_coupling, blik_error> {
+        let mut planes = Slab::new(Facing::bytes(&base.scene)?)?;
+        // SAFETY: dropped at the end of this function, after the last use.
+        let facing = Facing::new(&base.scene, &base.bvh, base.bvh.isa(), unsafe { planes.bytes_mut() })?;
         let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.tolerance)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
-        let cut = cut(base, settings, runner, unsafe { scratch.bytes_mut() })?;
+        let cut = cut(base, &facing, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(&cut)?)?;
         // SAFETY: the handle owns the slab.
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
@@ -627,7 +654,7 @@ mod owned {
         let done = Mutex::new(Vec::new());
         runner.each(unknowns.div_ceil(piece), runner.lanes(), 1.0 - PROBING, &|_, item| {
             let range = item * piece..((item + 1) * piece).min(unknowns);
-            let slabs = piece_of(base, &elements, &rows, range)?;
+            let slabs = piece_of(base, (&elements, &facing), &rows, range)?;
             done.lock().map_err(|_| blik_error::of(BLIK_ERROR_INTERNAL))?.push((item, slabs));
             Ok(())
         })?;
@@ -656,7 +683,7 @@ mod owned {
     /// The rows of one range, in as many blocks as it takes.
     fn piece_of(
         base: &blik_scene,
-        elements: &Elements<'_>,
+        (elements, facing): (&Elements<'_>, &Facing<'_>),
         rows: &RowSettings,
         range: Range<usize>,
     ) -> Result<Vec<Slab>, blik_error> {
@@ -667,7 +694,7 @@ mod owned {
             let mut slab = Slab::new(bytes)?;
             // SAFETY: the slab is not moved while its bytes are in use.
             let memory = unsafe { slab.bytes_mut() };
-            match fill(&base.scene, &base.bvh, elements, rows, next..range.end, memory) {
+            match fill(&base.scene, &base.bvh, elements, facing, rows, next..range.end, memory) {
                 Ok(done) => {
                     next += done;
                     records = 64.max(Block::open(memory)?.records() / done.max(1) + 16);

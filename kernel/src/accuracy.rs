@@ -80,7 +80,7 @@ pub fn carry(
 
 /// Expected squared error of the irradiance over pi of each unknown in `range`, relative to `reference`, in the band
 /// where it is largest: where noise is all there is, up to three times that. `radiance` is the solved diffuse radiance
-/// of all unknowns, `carried` what [`carry`] came to.
+/// of all unknowns, `carried` what [`carry`] came to. An element inside a body has its stand-in's.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
@@ -96,6 +96,9 @@ pub fn rows(
     let bands = system.shape.bands;
     let mut checks = Checks::ZERO;
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
+        let near = system.stand_in(unknown, &row);
+        let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
+        let (unknown, row) = known.unwrap_or((unknown, row));
         let sums = checks.of(&row, system.light, radiance, bands);
         let carried = carried.get(unknown * bands..).unwrap_or(&[]);
         let mut largest: f64 = 0.0;

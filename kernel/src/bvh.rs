@@ -257,6 +257,11 @@ impl<'m> Bvh<'m> {
         above::rises_above(self, normal, height)
     }
 
+    /// The instruction set that it uses.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
     /// The lowest and the highest coordinates of the facets that rays can meet; zeros where there is none.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         (self.low, self.high)

@@ -5,6 +5,7 @@
 //! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
 
 mod bake;
+mod exact;
 pub mod pack;
 pub mod rows;
 pub mod sink;

@@ -21,6 +21,7 @@ use crate::coupling::{Block, Coupling, sink};
 use crate::element::Elements;
 use crate::error::Error;
 use crate::facets;
+use crate::facing::Facing;
 use crate::image::{self, Tally, Target};
 use crate::index::IndexMut;
 use crate::light::{self, Light, Shape};
@@ -182,13 +183,15 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
+        let mut planes = Memory::new(Facing::bytes(&scene)?);
+        let facing = Facing::new(&scene, &bvh, self.isa, planes.bytes_mut())?;
         let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
         let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
         let probing = policy::probing(&rows);
         loop {
             let (work, unevenness) = cut.work();
             let probes = self.split(unevenness, 1, |range, out| {
-                work.probe(&scene, &bvh, probing, settings.tolerance, range, out)
+                work.probe(&scene, &bvh, &facing, (probing, settings.tolerance), range, out)
             })?;
             report.rays.visibility += probes.iter().sum::<u64>();
             if !cut.refine(&scene) {
@@ -200,7 +203,7 @@ impl Host {
         report.elements = elements.count();
         let unmerged = policy::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
-            fill(&scene, &bvh, &elements, &rows, range, memory)
+            fill(&scene, &bvh, &elements, &facing, &rows, range, memory)
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
         let coupling = Coupling::new(&blocks, elements.unknowns())?;

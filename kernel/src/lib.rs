@@ -71,6 +71,7 @@ pub mod coupling;
 pub mod element;
 pub mod error;
 pub mod facets;
+pub mod facing;
 pub mod form_factor;
 #[cfg(feature = "std")]
 pub mod host;

@@ -225,18 +225,43 @@ pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
 }
 
 /// Estimates up to so many tolerances are let pass: on the calibration's scenes they are about twice the error.
-const PASSES: f64 = 2.0;
+const PASSES: f64 = 1.5;
 
 /// The most rounds of one image, and the most and the least by which the tolerance falls from one to the next: half of it
 /// takes some four times as long.
 const ROUNDS: u32 = 3;
 const STEPS: (f64, f64) = (0.25, 0.7);
 
-/// The tolerance of another round for an image of which `asked` was wanted and whose last round, number `rounds`, worked
-/// to `tolerance` and estimates `estimate`, limited by the part of that name ([`Limit::name`]); `None` where it is good
-/// enough or would hardly be better.
-pub fn again(asked: f64, tolerance: f64, estimate: f64, limit: &str, rounds: u32) -> Option<f64> {
-    let done = estimate <= PASSES * asked || rounds >= ROUNDS || limit != Limit::Visibility.name();
-    let next = tolerance * clamp(PASSES * asked / estimate, STEPS.0, STEPS.1);
-    (!done && check_tolerance(next).is_ok()).then_some(next)
+/// A round that leaves so much of the last one's estimate: more rounds would, too.
+const IDLE: f64 = 0.8;
+
+/// The most rays and bytes that another round may be expected to take.
+const MOST_RAYS: f64 = 1e9;
+const MOST_BYTES: f64 = (2u64 << 30) as f64;
+
+/// One round of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Round {
+    /// The tolerance that it worked to.
+    pub tolerance: f64,
+    /// The error estimate that it came to.
+    pub estimate: f64,
+    /// Whether the diffuse solution limits it ([`Limit::Visibility`]).
+    pub by_visibility: bool,
+    /// Rays of visibility traced.
+    pub rays: u64,
+    /// Bytes of the coupling.
+    pub bytes: usize,
+}
+
+/// The tolerance of another round for an image of which `asked` was wanted, after the round `last`, number `rounds`, and
+/// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
+pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
+    let idle = before.is_some_and(|before| last.estimate > IDLE * before.estimate);
+    let done = last.estimate <= PASSES * asked || rounds >= ROUNDS || !last.by_visibility || idle;
+    let step = clamp(asked / last.estimate, STEPS.0, STEPS.1);
+    let growth = 1.0 / (step * step);
+    let large = last.rays as f64 * growth > MOST_RAYS || last.bytes as f64 * growth > MOST_BYTES;
+    let next = step * last.tolerance;
+    (!done && !large && check_tolerance(next).is_ok()).then_some(next)
 }

@@ -217,11 +217,7 @@ impl System<'_> {
     /// gathered table: a sliver of them may show at the body's edge.
     pub fn extend(&self, table: &mut [f64]) {
         for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
-            if row.row.state < TRACED || row.row.exposed > 0.0 {
-                continue;
-            }
-            let near = self.elements.neighbours(unknown).find(|&near| self.coupling.row(near).exposed > 0.0);
-            let Some(near) = near else { continue };
+            let Some(near) = self.stand_in(unknown, &row) else { continue };
             for level in 0..self.shape.levels {
                 let (to, from) = (self.shape.at(unknown, level), self.shape.at(near, level));
                 for (band, (to, from)) in to.zip(from).enumerate() {
@@ -231,6 +227,13 @@ impl System<'_> {
                 }
             }
         }
+    }
+
+    /// The neighbour whose irradiance an element inside a body takes.
+    pub fn stand_in(&self, unknown: usize, row: &RowView<'_>) -> Option<usize> {
+        let hidden = row.row.state >= TRACED && row.row.exposed == 0.0;
+        let exposed = |near: &usize| self.coupling.row(*near).exposed > 0.0;
+        if hidden { self.elements.neighbours(unknown).find(exposed) } else { None }
     }
 
     /// Diffuse radiance that the irradiance on one level makes, for the rows of `range`.

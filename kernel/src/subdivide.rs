@@ -8,12 +8,15 @@
 use crate::arena::{Arena, Need, plain_struct};
 use crate::bvh::{Ahead, Bvh};
 use crate::error::Error;
+use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
+use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::index::{Index, IndexMut, span};
 use crate::math::{Vec3, frame};
 use crate::mirror::{Surface, opens_to_sky};
 use crate::qmc::{Sequence, cosine_direction, hash2};
 use crate::quarter::{Path, QUARTERS, out_of};
 use crate::scene::Scene;
+use crate::simd::Isa;
 use core::ops::Range;
 
 /// Probed points of a triangle: the middles of its quarters' quarters.
@@ -27,6 +30,9 @@ const FEWEST_RAYS: u32 = 16;
 
 /// Points that meet this share of black backs lie inside a body, where nothing sees them.
 pub const INSIDE: f64 = 0.9375;
+
+/// The most facets that a triangle's points see for which closed forms cost less than rays.
+const MOST_CLOSED: usize = 2048;
 
 /// Unevenness counts from so many times the noise of half the rays on: one even triangle in ten thousand passes.
 const CERTAIN: f64 = 1.0;
@@ -226,8 +232,8 @@ impl Work<'_> {
         &self,
         scene: &Scene<'_>,
         bvh: &Bvh<'_>,
-        rays: u32,
-        tolerance: f64,
+        facing: &Facing<'_>,
+        (rays, tolerance): (u32, f64),
         range: Range<usize>,
         out: &mut [f64],
     ) -> Result<u64, Error> {
@@ -237,7 +243,7 @@ impl Work<'_> {
         let rays = rays.clamp(FEWEST_RAYS, MOST_RAYS);
         let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
         let many = most_elements(scene.facets(), tolerance) as f64;
-        let mut probe = Probe { scene, bvh, rays, negligible: 0.0, traced: 0 };
+        let mut probe = Probe { scene, bvh, facing, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
             let expected = core::mem::take(value);
             let facet = node.facet as usize;
@@ -262,10 +268,37 @@ impl Work<'_> {
 struct Probe<'a> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh<'a>,
+    facing: &'a Facing<'a>,
     rays: u32,
     /// An unevenness that need not be known better.
     negligible: f64,
     traced: u64,
+}
+
+/// Facets that are looked at together, and by how much each is brighter than the sky.
+struct Together {
+    block: TriangleBlock,
+    brightness: [f64; LANES],
+    count: usize,
+}
+
+impl Together {
+    fn put(&mut self, triangle: &[Vec3; 3], brightness: f64) {
+        self.block.set(self.count, triangle);
+        self.brightness.set(self.count, brightness);
+        self.count += 1;
+    }
+
+    /// Adds what they send to each point, and forgets them.
+    fn take(&mut self, isa: Isa, points: &[Vec3; POINTS], normal: Vec3, sums: &mut Sums) {
+        for (sum, point) in sums.iter_mut().zip(points) {
+            let mut factors = [[0.0; LANES]];
+            point_to_triangles(isa, *point, normal, core::slice::from_ref(&self.block), &mut factors);
+            let terms = factors[0].iter().zip(&self.brightness).take(self.count);
+            *sum += terms.map(|(factor, brightness)| factor * brightness).sum::<f64>();
+        }
+        self.count = 0;
+    }
 }
 
 /// Sums over the rays of each point.
@@ -280,6 +313,9 @@ impl Probe<'_> {
             let (u, v) = Path(node.path).out_of(a, b);
             Surface::new(self.scene, facet, side, u, v)
         });
+        if let Some(even) = self.closed(node, side, &origins) {
+            return even;
+        }
         let (x, y) = frame(self.scene.side_normal(facet, side));
         let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000 ^ node.path));
         let (mut sums, mut half, mut backs) = ([0.0; POINTS], [0.0; POINTS], [0u32; POINTS]);
@@ -305,6 +341,46 @@ impl Probe<'_> {
             }
             goal = (2 * goal).min(self.rays);
         }
+    }
+
+    /// Unevenness without rays, where nothing hides anything and rays would cost more.
+    fn closed(&self, node: &Node, side: usize, origins: &[Surface; POINTS]) -> Option<f64> {
+        let facet = node.facet as usize;
+        let normal = self.scene.side_normal(facet, side);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
+            let (u, v) = Path(node.path).out_of(a, b);
+            Surface::new(self.scene, facet, side, u, v).point
+        });
+        let receiver = Receiver { facet, side, normal, corners };
+        let clear = Clear::whole(self.scene, self.facing, &receiver, MOST_CLOSED)?;
+        let mut sums = [1.0; POINTS];
+        let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
+        let points = origins.each_ref().map(|origin| origin.point);
+        let base = corners[0].dot(normal);
+        for other in self.facing.before(facet, side) {
+            let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
+            let above = triangle.iter().all(|c| c.dot(normal) - base >= -FLAT);
+            let (low, high) = heights(self.scene, other, &corners);
+            for other_side in (0..sides).filter(|&s| clear.has(other, s, sides)) {
+                let surface = Surface::new(self.scene, other, other_side, 1.0 / 3.0, 1.0 / 3.0);
+                let brightness = self.brightness(&surface) - 1.0;
+                if above && (if other_side == 0 { low >= -FLAT } else { high <= FLAT }) {
+                    together.put(&triangle, brightness);
+                    if together.count == LANES {
+                        together.take(self.bvh.isa(), &points, normal, &mut sums);
+                    }
+                    continue;
+                }
+                for (sum, point) in sums.iter_mut().zip(points) {
+                    if (point - surface.point).dot(surface.normal) > 0.0 {
+                        *sum += brightness * point_to_triangle(point, normal, &triangle);
+                    }
+                }
+            }
+        }
+        together.take(self.bvh.isa(), &points, normal, &mut sums);
+        let half = sums.map(|sum| 0.5 * sum);
+        Some(residuals(&half, &sums, &[true; POINTS], 0.5).0)
     }
 
     /// One ray from each point, all along one direction: (in the plane, cosine).

@@ -13,6 +13,7 @@ use blik_kernel::chain::{ChainSettings, Solved};
 use blik_kernel::coupling::rows::{self, RowSettings};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
+use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Tally, Target};
 use blik_kernel::light::{self, Light, Shape};
 use blik_kernel::policy;
@@ -64,6 +65,7 @@ pub struct Workspace {
     blocks: Vec<Vec<u8>>,
     beams: Vec<Vec<u8>>,
     trees: Vec<u8>,
+    planes: Vec<u8>,
     pub tables: Tables,
     pub view: Outputs,
 }
@@ -109,6 +111,8 @@ impl Workspace {
             elements: vec![0xa5; 4 * (unknowns + 4 * facets) + 1024],
             blocks: vec![vec![0xa5; block]; PARTS],
             beams: vec![vec![0xa5; block]; PARTS],
+            // what a table of planes takes at most
+            planes: vec![0xa5; 10 << 20],
             // trees of quarters, at the tightest tolerance of these tests
             trees: vec![0xa5; Cut::bytes(facets, 5e-4).unwrap()],
             tables: Tables {
@@ -201,13 +205,14 @@ pub fn run(
     let build = if plan.obvhs { Bvh::build_obvhs } else { Bvh::build };
     let bvh = build(scene.corners(), scene.areas(), plan.isa, &mut work.bvh[..bytes])?;
 
+    let facing = Facing::new(&scene, &bvh, plan.isa, &mut work.planes)?;
     let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
     let probing = policy::probing(&settings);
     let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
     loop {
         let (fresh, unevenness) = cut.work();
         split(parts, fresh.len(), 1, unevenness, |range, out| {
-            counts.visibility += fresh.probe(&scene, &bvh, probing, plan.tolerance, range, out)?;
+            counts.visibility += fresh.probe(&scene, &bvh, &facing, (probing, plan.tolerance), range, out)?;
             Ok(())
         })?;
         if !cut.refine(&scene) {
@@ -218,7 +223,7 @@ pub fn run(
     let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
     let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
-        rows::fill(&scene, &bvh, &elements, &settings, range, memory)
+        rows::fill(&scene, &bvh, &elements, &facing, &settings, range, memory)
     })?;
     let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
     for (_, row) in coupling.rows(0..counts.unknowns) {

@@ -6,16 +6,22 @@
 //! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
+//! What nothing hides ([`crate::facing`]) is entered in closed form instead ([`super::exact`]) where that costs less:
+//! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
+//! hemisphere, which is known.
+//!
 //! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand
 //! for what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside
 //! a body, and counts or not.
 
+use super::exact::{self, Entries};
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
 use crate::error::Error;
+use crate::facing::{Clear, Facing, Receiver};
 use crate::index::{Index, IndexMut};
 use crate::inside::inside;
 use crate::math::{Vec3, clamp, frame, pow};
@@ -83,12 +89,24 @@ fn departures(open: [bool; PARTS]) -> [f64; PARTS] {
     })
 }
 
+/// The most entries in closed form of one row.
+const MOST_CLOSED: usize = 4096;
+
+/// Entries in closed form that cost as much as a ray.
+const RAY: f64 = 0.35;
+
+/// Entries in closed form that together exceed the hemisphere by this hide one another, whatever was proven.
+const OVERFULL: f64 = 0.02;
+
 /// How many times the rays of a facet of mean area the largest and the smallest elements have.
 const MOST_FACTOR: f64 = 2.0;
 const LEAST_FACTOR: f64 = 0.25;
 
 /// The fewest rays of a row.
 const FEWEST: u32 = 64;
+
+/// Fewer rays from outside a body say less of an element than what is beside it.
+const LEAST_EXPOSED: u32 = 32;
 
 /// The power of two nearest to so many rays.
 fn whole(rays: f64) -> u32 {
@@ -145,6 +163,7 @@ pub fn fill(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,
     elements: &Elements<'_>,
+    facing: &Facing<'_>,
     settings: &RowSettings,
     range: Range<usize>,
     memory: &mut [u8],
@@ -153,7 +172,7 @@ pub fn fill(
     let sink = Sink::new(&range, scene.bands(), settings.directional, memory)?;
     let wanted = range.len();
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
-    let mut tracer = Tracer { scene, bvh, elements, settings, mean_area, sink };
+    let mut tracer = Tracer { scene, bvh, elements, facing, settings, mean_area, sink };
     for unknown in range {
         if tracer.row(unknown).is_none() {
             tracer.sink.drop_row();
@@ -170,6 +189,7 @@ struct Tracer<'a, 'm> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh<'a>,
     elements: &'a Elements<'a>,
+    facing: &'a Facing<'a>,
     settings: &'a RowSettings,
     mean_area: f64,
     sink: Sink<'m>,
@@ -189,8 +209,13 @@ struct Start {
 struct Tally {
     rays: u32,
     chain_rays: u32,
+    /// Rays that met what is not entered in closed form, and rays that met what is, mirrors among it apart.
     blocked: u32,
+    clear: u32,
+    mirrored: u32,
     lost: f64,
+    /// Share of the hemisphere that is entered in closed form.
+    known: f64,
     /// Rays of each part's parts, and how many of them met a black back first.
     bins: [u32; BINS],
     backs: [u32; BINS],
@@ -206,7 +231,15 @@ impl Tally {
         core::array::from_fn(|bin| some && self.backs.at(bin) < self.bins.at(bin))
     }
 
-    /// Rays of each part's part that did not start inside a body; all where none did not, and then true.
+    /// By what rays that first met what is not known, or escaped, count, and by what the others do: together as much as
+    /// is not known, and as is.
+    fn kinds(&self) -> [f64; 2] {
+        let (all, clear) = (f64::from(self.rays), f64::from(self.clear));
+        let of = |share: f64, rays: f64| if rays > 0.0 { share.max(0.0) * all / rays } else { 0.0 };
+        if self.known > 0.0 { [of(1.0 - self.known, all - clear), of(self.known, clear)] } else { [1.0; 2] }
+    }
+
+    /// Rays of each part's part that did not start inside a body; all where hardly one did not, and then true.
     fn exposed(&self) -> ([u32; BINS], bool) {
         let mut exposed = [0; BINS];
         for part in 0..PARTS {
@@ -227,7 +260,7 @@ impl Tally {
                 exposed.set(at, seen);
             }
         }
-        if exposed.iter().all(|e| *e == 0) { (self.bins, true) } else { (exposed, false) }
+        if exposed.iter().sum::<u32>() < LEAST_EXPOSED { (self.bins, true) } else { (exposed, false) }
     }
 }
 
@@ -254,26 +287,98 @@ impl Tracer<'_, '_> {
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
         let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
-        let mut tally = self.rays(&start, most, [false; BINS])?;
-        let mixed = tally.mixed();
-        if self.scene.sides() == 1 && mixed.contains(&true) {
-            self.sink.drop_row();
-            tally = self.rays(&start, most, mixed)?;
-        }
+        let tally = match self.closed(&start, normal, most)? {
+            Some(tally) => tally,
+            None => self.sampled(&start, most)?,
+        };
         self.end_row(&tally);
         Some(())
     }
 
-    /// As many rays as are needed, at most `most`; those that start inside a body in parts named by `apart` leave no
-    /// record.
-    fn rays(&mut self, start: &Start, most: u32, apart: [bool; BINS]) -> Option<Tally> {
+    /// The row by rays alone.
+    fn sampled(&mut self, start: &Start, most: u32) -> Option<Tally> {
+        let tally = self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None)?;
+        let mixed = tally.mixed();
+        if self.scene.sides() == 1 && mixed.contains(&true) {
+            self.sink.drop_row();
+            return self.rays(start, (FEWEST.max(most / 16), most), mixed, None);
+        }
+        Some(tally)
+    }
+
+    /// The row with entries in closed form to what nothing hides, and rays for the rest; the inner value is none where
+    /// rays alone cost less, or where parts of the element may lie inside a body.
+    fn closed(&mut self, start: &Start, normal: Vec3, most: u32) -> Option<Option<Tally>> {
+        let corners = self.elements.corners(self.scene, start.element);
+        let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
+        let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
+        let limit = (2 * most as usize).min(MOST_CLOSED);
+        let possible = Clear::possible(self.scene, self.facing, &receiver, count);
+        if possible == 0 || possible > limit || !self.is_worth(start, possible, most)? {
+            return Some(None);
+        }
+        let clear = Clear::new(self.scene, self.facing, &receiver, limit, count);
+        let mut tally = Tally::default();
+        if !clear.all || self.scene.largest_specular() > 0.0 {
+            tally = self.rays(start, (FEWEST, most), [false; BINS], Some(&clear))?;
+            if tally.backs.iter().any(|b| *b > 0) {
+                self.sink.drop_row();
+                return Some(None);
+            }
+        }
+        if clear.elements == 0 {
+            self.sink.drop_row();
+            return Some(None);
+        }
+        let all = [true; PARTS];
+        let entries = Entries {
+            scene: self.scene,
+            elements: self.elements,
+            sink: &mut self.sink,
+            isa: self.bvh.isa(),
+            directional: self.settings.directional,
+            rays: most,
+            slopes: slopes(all),
+            departures: departures(all),
+        };
+        tally.known = entries.add(&receiver, self.facing, &clear)?;
+        if tally.known > 1.0 + OVERFULL {
+            self.sink.drop_row();
+            return Some(None);
+        }
+        Some(Some(tally))
+    }
+
+    /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
+    fn is_worth(&mut self, start: &Start, entries: usize, most: u32) -> Option<bool> {
+        if entries <= FEWEST as usize {
+            return Some(true);
+        }
+        let mut tally = Tally::default();
+        self.batch(start, &mut tally, FEWEST.min(GROUP as u32), None)?;
+        self.sink.drop_row();
+        let wanted = enough(most, tally.rays, f64::from(tally.blocked));
+        Some(f64::from(wanted) * RAY >= entries as f64)
+    }
+
+    /// As many rays as are needed, from the first number up to the second; those that start inside a body in parts named
+    /// by `apart` leave no record, nor do the first hits on what is `clear`.
+    fn rays(
+        &mut self,
+        start: &Start,
+        (fewest, most): (u32, u32),
+        apart: [bool; BINS],
+        clear: Option<&Clear>,
+    ) -> Option<Tally> {
         let mut tally = Tally { apart, ..Tally::default() };
-        let mut goal = (most / 16).max(FEWEST).min(most);
+        let rho = self.scene.largest_specular();
+        let mut goal = fewest.min(most);
         while tally.rays < goal {
             let count = (goal - tally.rays).min(GROUP as u32);
-            self.batch(start, &mut tally, count)?;
+            self.batch(start, &mut tally, count, clear)?;
             if tally.rays == goal {
-                goal = enough(most, goal, tally.blocked);
+                // what a mirror shows counts with its reflectance, whose square scales the variance
+                goal = enough(most, goal, f64::from(tally.blocked) + rho * rho * f64::from(tally.mirrored));
             }
         }
         Some(tally)
@@ -289,30 +394,44 @@ impl Tracer<'_, '_> {
     /// Turns what the parts saw into the row.
     fn end_row(&mut self, tally: &Tally) {
         let (exposed, hidden) = tally.exposed();
+        let closed = tally.known > 0.0;
         let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
-        let share = 1.0 / f64::from(tally.rays);
+        let share = 1.0 / f64::from(tally.rays.max(1));
         // the lesser part of the hemisphere is kept
         let counted = tally.rays - tally.inside.iter().sum::<u32>();
-        let enclosed =
-            self.settings.directional && !hidden && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
+        let enclosed = self.settings.directional
+            && !hidden
+            && !closed
+            && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
         let dropped = if enclosed { BLOCKED } else { EMPTY };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },
             rays: tally.rays,
             chain_rays: tally.chain_rays,
-            exposed: if hidden { 0.0 } else { (f64::from(seen) * share) as f32 },
+            exposed: match (closed, hidden) {
+                (true, _) => 1.0,
+                (false, true) => 0.0,
+                (false, false) => (f64::from(seen) * share) as f32,
+            },
             lost: tally.lost * share,
             ..Row::default()
         };
         let (slopes, departures) =
             (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
         let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
-        let mean = 1.0 / f64::from(seen);
+        let mean = 1.0 / f64::from(seen.max(1));
+        let kinds = tally.kinds();
         let exposed_all = seen == tally.rays;
-        let finish = |record: Record| {
-            let bin = record.gradient[0] as usize % BINS;
+        let finish = |mut record: Record| {
+            if let Some(record) = exact::finished(&record) {
+                return Some(record);
+            }
+            let (kind, bin) = (record.gradient[0] as usize / BINS, record.gradient[0] as usize % BINS);
+            let scale = kinds[kind % 2];
+            record.weight *= scale;
+            record.moment = record.moment.map(|m| m * scale as f32);
             if exposed[bin] == 0 || (record.is_escape() && record.word() == dropped) {
                 return None;
             }
@@ -333,7 +452,7 @@ impl Tracer<'_, '_> {
     }
 
     /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
-    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32) -> Option<()> {
+    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32, clear: Option<&Clear>) -> Option<()> {
         let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
         let mut bins = [0; GROUP];
         let mut hits = [None; GROUP];
@@ -343,7 +462,7 @@ impl Tracer<'_, '_> {
         }
         self.bvh.closest_many(rays, hits);
         for ((ray, &hit), &bin) in rays.iter().zip(&*hits).zip(&bins) {
-            self.follow(start, tally, *ray, hit, bin)?;
+            self.follow(start, tally, (*ray, hit), bin, clear)?;
             tally.rays += 1;
         }
         Some(())
@@ -371,16 +490,16 @@ impl Tracer<'_, '_> {
         &mut self,
         start: &Start,
         tally: &mut Tally,
-        mut ray: Ray,
-        mut met: Option<Hit>,
+        (mut ray, mut met): (Ray, Option<Hit>),
         bin: usize,
+        clear: Option<&Clear>,
     ) -> Option<()> {
         let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
         let sequence = &start.sequences[part];
         let first = ray.direction;
         *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
-        let mark = [bin as f32, index as f32];
+        let mut mark = [bin as f32, index as f32];
         let (mut word, mut weight) = (EMPTY, 1.0);
         let ray_start = self.sink.used();
         loop {
@@ -397,12 +516,22 @@ impl Tracer<'_, '_> {
                     tally.inside[bin] += 1;
                     return Some(());
                 }
+            }
+            let known = word == EMPTY
+                && clear
+                    .zip(surface.as_ref())
+                    .is_some_and(|(c, s)| c.has(s.facet, s.side, self.scene.sides()));
+            if known {
+                tally.clear += 1;
+                tally.mirrored += u32::from(surface.as_ref().is_some_and(|s| s.mirror(self.scene).is_some()));
+                mark[0] += BINS as f32;
+            } else if word == EMPTY {
                 tally.blocked += 1;
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
             }
             let Some(surface) = surface else { return Some(()) };
             let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            if self.glows(surface.material) {
+            if self.glows(surface.material) && !known {
                 self.sink.push(Record::target(target, word, weight, mark))?;
             }
             let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
@@ -453,9 +582,9 @@ impl Tracer<'_, '_> {
 /// Rays that a row needs when `blocked` of its first `rays` met something: the error goes with the square root of
 /// the variance and with n^-3/4. The variance of the blocked share p is p (1 - p); where half the rays or more meet
 /// facets, it is which facets they meet that counts, and the variance is taken at its largest, 1/4.
-fn enough(most: u32, rays: u32, blocked: u32) -> u32 {
+fn enough(most: u32, rays: u32, blocked: f64) -> u32 {
     // one ray more may have met something
-    let p = ((f64::from(blocked) + 1.0) / (f64::from(rays) + 1.0)).min(0.5);
+    let p = ((blocked + 1.0) / (f64::from(rays) + 1.0)).min(0.5);
     let wanted = pow(4.0 * p * (1.0 - p), 2.0 / 3.0) * f64::from(most);
     let mut goal = rays;
     while f64::from(goal) < wanted && goal < most {

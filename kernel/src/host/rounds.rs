@@ -1,7 +1,7 @@
 //! Images that come out worse than asked are computed again, more finely.
 
 use super::{Rays, Report, Seconds};
-use crate::policy;
+use crate::policy::{self, Limit, Round};
 
 /// The rounds of one image. Each computes geometry, light and image to [`Rounds::tolerance`], and asks
 /// [`Rounds::again`] whether there is to be another.
@@ -34,6 +34,7 @@ pub struct Rounds {
     asked: f64,
     tolerance: f64,
     done: u32,
+    last: Option<Round>,
     seconds: Seconds,
     rays: Rays,
 }
@@ -41,7 +42,8 @@ pub struct Rounds {
 impl Rounds {
     /// Rounds of an image whose error is to be `tolerance`.
     pub fn new(tolerance: f64) -> Rounds {
-        Rounds { asked: tolerance, tolerance, done: 0, seconds: Seconds::default(), rays: Rays::default() }
+        let (seconds, rays) = (Seconds::default(), Rays::default());
+        Rounds { asked: tolerance, tolerance, done: 0, last: None, seconds, rays }
     }
 
     /// What the present round is to be computed to.
@@ -53,13 +55,20 @@ impl Rounds {
     /// error that was asked for.
     pub fn again(&mut self, report: &mut Report) -> bool {
         self.done += 1;
+        let round = Round {
+            tolerance: self.tolerance,
+            estimate: report.error_estimate,
+            by_visibility: report.limited_by == Limit::Visibility.name(),
+            rays: report.rays.visibility,
+            bytes: report.bytes.coupling,
+        };
         self.seconds.add(&report.seconds);
         self.rays.add(&report.rays);
         report.tolerance = self.asked;
         report.tolerance_met = report.error_estimate <= self.asked;
         (report.seconds, report.rays, report.rounds) = (self.seconds, self.rays, self.done);
-        let next =
-            policy::again(self.asked, self.tolerance, report.error_estimate, report.limited_by, self.done);
+        let next = policy::again(self.asked, &round, self.last.as_ref(), self.done);
+        self.last = Some(round);
         self.tolerance = next.unwrap_or(self.tolerance);
         next.is_some()
     }

@@ -1,0 +1,441 @@
+//! Entries of a row to facets that nothing hides: form factors in closed form from points of the element, no rays.
+//!
+//! [`crate::facing`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
+//! each of the element's quarters takes Gauss points as near to each other as the distance asks for, and makes mean,
+//! gradients and the departure from them as rays' hits would. The quadrature's error is a small part of that which
+//! the row's rays would have.
+
+use super::sink::Sink;
+use super::word::EMPTY;
+use super::{BLOCKED, Record};
+use crate::element::Elements;
+use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
+use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
+use crate::index::Index;
+use crate::math::{Vec3, pow, sqrt};
+use crate::quarter::{self, QUARTERS};
+use crate::scene::Scene;
+use crate::simd::Isa;
+
+/// Gauss points of a triangle: weights of corners 1 and 2, weight. Of degree 1, 2 and 4 (Strang and Fix, 1973).
+const ONE: [(f64, f64, f64); 1] = [(1.0 / 3.0, 1.0 / 3.0, 1.0)];
+const THREE: [(f64, f64, f64); 3] =
+    [(1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0), (2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0)];
+const SIX: [(f64, f64, f64); 6] = {
+    const A: (f64, f64) = (0.445_948_490_915_965, 0.223_381_589_678_011);
+    const B: (f64, f64) = (0.091_576_213_509_771, 0.109_951_743_655_322);
+    [
+        (A.0, A.0, A.1),
+        (1.0 - 2.0 * A.0, A.0, A.1),
+        (A.0, 1.0 - 2.0 * A.0, A.1),
+        (B.0, B.0, B.1),
+        (1.0 - 2.0 * B.0, B.0, B.1),
+        (B.0, 1.0 - 2.0 * B.0, B.1),
+    ]
+};
+
+/// Times that a quarter is cut again beside what it touches.
+const DEEPEST: u32 = 4;
+
+/// Which rule serves a triangle of so large a radius over the distance.
+#[derive(Clone, Copy, PartialEq)]
+struct Rules {
+    one: f64,
+    three: f64,
+    six: f64,
+}
+
+impl Rules {
+    /// For the relative error `e` of a factor: of degrees 1, 2 and 4 it is some 0.3 x^2, 0.3 x^4 (the odd order cancels
+    /// about the point) and 0.3 x^6 at the ratio x.
+    fn new(e: f64) -> Rules {
+        let at = |power: f64| pow(e / 0.3, 1.0 / power).min(0.6);
+        Rules { one: at(2.0), three: at(4.0), six: at(6.0) }
+    }
+
+    fn of(&self, ratio: f64) -> Option<&'static [(f64, f64, f64)]> {
+        match ratio {
+            x if x <= self.one => Some(&ONE),
+            x if x <= self.three => Some(&THREE),
+            x if x <= self.six => Some(&SIX),
+            _ => None,
+        }
+    }
+}
+
+/// Entries of one row on their way into its block.
+pub(super) struct Entries<'a, 'm> {
+    pub scene: &'a Scene<'a>,
+    pub elements: &'a Elements<'a>,
+    pub sink: &'a mut Sink<'m>,
+    pub isa: Isa,
+    /// Whether directions of what is blocked are kept.
+    pub directional: bool,
+    /// Rays that such a row would have at most.
+    pub rays: u32,
+    /// Gradients by what quarters see, and departures from them.
+    pub slopes: [[f64; 2]; QUARTERS],
+    pub departures: [f64; QUARTERS],
+}
+
+/// An element that the row sees.
+#[derive(Clone, Copy)]
+struct Target {
+    unknown: usize,
+    corners: [Vec3; 3],
+    normal: Vec3,
+    glows: bool,
+}
+
+/// The elements of a side of a facet.
+fn targets<'a>(
+    scene: &'a Scene<'a>,
+    elements: &'a Elements<'a>,
+    facet: usize,
+    side: usize,
+) -> impl Iterator<Item = Target> + use<'a> {
+    let material = scene.material(facet);
+    let glows = scene.diffuse(material).iter().chain(scene.emission(material)).any(|&x| x > 0.0);
+    let normal = scene.side_normal(facet, side);
+    elements.unknowns_of(facet, side).map(move |unknown| {
+        let corners = elements.corners(scene, unknown / scene.sides().max(1));
+        Target { unknown, corners, normal, glows }
+    })
+}
+
+/// Elements that one rule serves, until they fill all lanes.
+struct Lanes {
+    block: TriangleBlock,
+    targets: [Option<Target>; LANES],
+    count: usize,
+}
+
+/// What is left of the light that small elements of a neighbourhood block, until it is a ray's worth.
+#[derive(Default)]
+struct Blocked {
+    weight: f64,
+    toward: Vec3,
+    gradient: [f64; 2],
+    departure: f64,
+}
+
+/// Directions that one record may stand for: as far apart as a few rays of the row.
+const TOGETHER: f64 = 4.0;
+
+impl Entries<'_, '_> {
+    /// Adds the entries of all that is proven to be clear; returns the share of the hemisphere that they fill. `None`
+    /// where the memory is full.
+    pub fn add(mut self, receiver: &Receiver, facing: &Facing<'_>, clear: &Clear) -> Option<f64> {
+        // a small part of the error of rays, 0.9 n^-2/3
+        let rules = Rules::new(0.05 * pow(f64::from(self.rays), -2.0 / 3.0));
+        let quarters = [0, 1, 2, 3].map(|q| part_of(&receiver.corners, q));
+        let place = Place { receiver, quarters, rules, middle: middle(&receiver.corners) };
+        let mut lanes =
+            [(); 3].map(|()| Lanes { block: TriangleBlock::EMPTY, targets: [None; LANES], count: 0 });
+        let (mut share, mut blocked) = (0.0, Blocked::default());
+        let sides = self.scene.sides();
+        for facet in facing.before(receiver.facet, receiver.side) {
+            for side in (0..sides).filter(|&side| clear.has(facet, side, sides)) {
+                for target in targets(self.scene, self.elements, facet, side) {
+                    let Some(class) = place.class(self.scene, facet, side, &target) else {
+                        let factors = place.quarters.map(|q| place.mean(&q, &target, 0));
+                        share += self.entry(&place, &target, factors, true, &mut blocked)?;
+                        continue;
+                    };
+                    let Some(lanes) = lanes.get_mut(class) else { continue };
+                    lanes.block.set(lanes.count, &target.corners);
+                    if let Some(slot) = lanes.targets.get_mut(lanes.count) {
+                        *slot = Some(target);
+                    }
+                    lanes.count += 1;
+                    if lanes.count == LANES {
+                        share += self.flush(&place, class, lanes, &mut blocked)?;
+                    }
+                }
+            }
+        }
+        for (class, lanes) in lanes.iter_mut().enumerate() {
+            share += self.flush(&place, class, lanes, &mut blocked)?;
+        }
+        self.flush_blocked(&mut blocked)?;
+        Some(share)
+    }
+
+    /// Evaluates the elements of one rule.
+    fn flush(
+        &mut self,
+        place: &Place<'_>,
+        class: usize,
+        lanes: &mut Lanes,
+        blocked: &mut Blocked,
+    ) -> Option<f64> {
+        let rule: &[(f64, f64, f64)] = match class {
+            0 => &ONE,
+            1 => &THREE,
+            _ => &SIX,
+        };
+        let mut means = [[0.0; LANES]; QUARTERS];
+        let mut share = 0.0;
+        if lanes.count == 0 {
+            return Some(share);
+        }
+        for (quarter, means) in place.quarters.iter().zip(&mut means) {
+            for &(u, v, weight) in rule {
+                let mut factors = [[0.0; LANES]];
+                let point = crate::element::point(quarter, u, v);
+                let block = core::slice::from_ref(&lanes.block);
+                point_to_triangles(self.isa, point, place.receiver.normal, block, &mut factors);
+                means.iter_mut().zip(factors[0]).for_each(|(mean, factor)| *mean += weight * factor);
+            }
+        }
+        for (lane, target) in lanes.targets.iter_mut().take(lanes.count).enumerate() {
+            let Some(target) = target.take() else { continue };
+            let factors = means.each_ref().map(|of| of.at(lane));
+            share += self.entry(place, &target, factors, false, blocked)?;
+        }
+        lanes.count = 0;
+        Some(share)
+    }
+
+    /// Adds one entry, by what the receiver's quarters see of the target; returns its mean.
+    fn entry(
+        &mut self,
+        place: &Place<'_>,
+        target: &Target,
+        factors: [f64; QUARTERS],
+        near: bool,
+        blocked: &mut Blocked,
+    ) -> Option<f64> {
+        let weight = 0.25 * factors.iter().sum::<f64>();
+        if weight <= 0.0 {
+            return Some(0.0);
+        }
+        let gradient = self.gradient(&factors);
+        let departure: f64 = self.departures.iter().zip(factors).map(|(d, f)| d * f).sum();
+        if target.glows {
+            let moment = if near { place.near_moment(target) } else { place.moment(target) };
+            self.sink.push(Record {
+                checks: mark(departure),
+                moment: moment.map(|m| (weight * m) as f32),
+                ..Record::target((target.unknown, (0.0, 0.0)), EMPTY, weight, gradient.map(|g| g as f32))
+            })?;
+        }
+        let parts = if self.directional { weight * f64::from(self.rays) } else { 0.0 };
+        if parts > 1.0 {
+            self.flush_blocked(blocked)?;
+            self.block_parts(place, target, &factors, parts)?;
+            return Some(weight);
+        }
+        let toward = (middle(&target.corners) - place.middle).normalize_or_zero();
+        if self.directional && blocked.is_apart(toward, f64::from(self.rays)) {
+            self.flush_blocked(blocked)?;
+        }
+        blocked.weight += weight;
+        blocked.toward += toward * weight;
+        blocked.gradient[0] += gradient[0];
+        blocked.gradient[1] += gradient[1];
+        blocked.departure += departure;
+        if self.directional && blocked.weight * f64::from(self.rays) > 1.0 {
+            self.flush_blocked(blocked)?;
+        }
+        Some(weight)
+    }
+
+    fn gradient(&self, factors: &[f64; QUARTERS]) -> [f64; 2] {
+        let mut gradient = [0.0; 2];
+        for (slopes, factor) in self.slopes.iter().zip(factors) {
+            gradient.iter_mut().zip(slopes).for_each(|(g, slope)| *g += slope * factor);
+        }
+        gradient
+    }
+
+    /// Notes what a target blocks of the sky as some `count` directions of each quarter's to parts of the target.
+    fn block_parts(
+        &mut self,
+        place: &Place<'_>,
+        target: &Target,
+        factors: &[f64; QUARTERS],
+        count: f64,
+    ) -> Option<()> {
+        let mut levels = 0;
+        while levels < MOST_LEVELS && f64::from(8u32 << (2 * levels)) <= count {
+            levels += 1;
+        }
+        let (slopes, departures) = (self.slopes, self.departures);
+        let quarters = place.quarters.iter().zip(factors).zip(slopes.into_iter().zip(departures));
+        for ((quarter, factor), (slopes, departure)) in quarters {
+            let from = middle(quarter);
+            let parts = 1u32 << (2 * levels);
+            let of = |number: u32| part_at(&target.corners, number, levels);
+            let seen = |part: &[Vec3; 3]| place.point_factor(from, part, target);
+            let all: f64 = (0..parts).map(|n| seen(&of(n))).sum();
+            for number in 0..parts {
+                let part = of(number);
+                let share = if all > 0.0 { seen(&part) / all } else { 1.0 / f64::from(parts) };
+                let own = share * factor;
+                if own > 0.0 {
+                    let gradient = slopes.map(|slope| (slope * own) as f32);
+                    let toward = (middle(&part) - from).normalize_or_zero();
+                    let record = Record::escape(Some(toward), BLOCKED, 0.25 * own, gradient);
+                    let checks = mark(departure * own);
+                    self.sink.push(Record { checks, ..record })?;
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn flush_blocked(&mut self, blocked: &mut Blocked) -> Option<()> {
+        let Blocked { weight, toward, gradient, departure } = core::mem::take(blocked);
+        if weight > 0.0 {
+            let toward = self.directional.then(|| toward.try_normalize()).flatten();
+            let record = Record::escape(toward, BLOCKED, weight, gradient.map(|g| g as f32));
+            self.sink.push(Record { checks: mark(departure), ..record })?;
+        }
+        Some(())
+    }
+}
+
+/// Times that a target is cut for the directions that it blocks.
+const MOST_LEVELS: u32 = 5;
+
+impl Blocked {
+    /// Whether a direction lies far from those so far.
+    fn is_apart(&self, toward: Vec3, rays: f64) -> bool {
+        let sum = self.toward.length_squared();
+        let cosine = self.toward.dot(toward);
+        self.weight > 0.0 && cosine * cosine < (1.0 - TOGETHER / rays) * sum
+    }
+}
+
+/// Beside what an element touches, light departs from a linear function by so many times more than its quarters' means
+/// do: in a corner of three walls 2.3 times at coarse elements, 1.1 at fine ones.
+const UNSEEN: f64 = 2.0;
+
+/// Marks a record as exact until its row ends: its checks are final.
+fn mark(departure: f64) -> [f32; 4] {
+    let departure = (UNSEEN * departure) as f32;
+    [f32::INFINITY, 0.0, departure, departure]
+}
+
+/// The finished record, where it is one that was marked as exact.
+pub(super) fn finished(record: &Record) -> Option<Record> {
+    let [marked, _, one, other] = record.checks;
+    (marked == f32::INFINITY).then_some(Record { checks: [0.0, 0.0, one, other], ..*record })
+}
+
+/// The receiver and what follows from it.
+struct Place<'a> {
+    receiver: &'a Receiver,
+    quarters: [[Vec3; 3]; QUARTERS],
+    rules: Rules,
+    middle: Vec3,
+}
+
+impl Place<'_> {
+    /// The rule, by its number, that serves all quarters for a target that is wholly above the receiver's horizon, and
+    /// the receiver above its own; none for others.
+    fn class(&self, scene: &Scene<'_>, facet: usize, side: usize, target: &Target) -> Option<usize> {
+        let base = self.receiver.corners[0].dot(self.receiver.normal);
+        let above = target.corners.iter().all(|c| c.dot(self.receiver.normal) - base >= -FLAT);
+        let (low, high) = heights(scene, facet, &self.receiver.corners);
+        let faced = if side == 0 { low >= -FLAT } else { high <= FLAT };
+        let radius = radius(&self.receiver.corners, self.middle);
+        let distance = distance(self.middle, &target.corners) - 0.5 * radius;
+        if !above || !faced || distance <= 0.0 {
+            return None;
+        }
+        match self.rules.of(0.5 * radius / distance)?.len() {
+            1 => Some(0),
+            3 => Some(1),
+            _ => Some(2),
+        }
+    }
+
+    /// From a point of the receiver to (a part of) a target: 0 from behind it.
+    fn point_factor(&self, point: Vec3, part: &[Vec3; 3], target: &Target) -> f64 {
+        let before = (point - part[0]).dot(target.normal) > 0.0;
+        if before { point_to_triangle(point, self.receiver.normal, part) } else { 0.0 }
+    }
+
+    /// The mean over a triangle of the receiver of the factor to a target.
+    fn mean(&self, triangle: &[Vec3; 3], target: &Target, depth: u32) -> f64 {
+        let centre = middle(triangle);
+        let ratio = radius(triangle, centre) / distance(centre, &target.corners).max(f64::MIN_POSITIVE);
+        let rule = self.rules.of(ratio).unwrap_or(&SIX);
+        if ratio > self.rules.six && depth < DEEPEST {
+            return (0..QUARTERS).map(|q| 0.25 * self.mean(&part_of(triangle, q), target, depth + 1)).sum();
+        }
+        let of = |&(u, v, weight): &(f64, f64, f64)| {
+            weight * self.point_factor(crate::element::point(triangle, u, v), &target.corners, target)
+        };
+        rule.iter().map(of).sum()
+    }
+
+    /// Where on a near target its light comes from on average, in its local coordinates: by its quarters.
+    fn near_moment(&self, target: &Target) -> [f64; 2] {
+        let (mut sum, mut moment) = (0.0, [0.0; 2]);
+        for number in 0..QUARTERS {
+            let part = part_of(&target.corners, number);
+            let factor: f64 = self.quarters.iter().map(|q| self.point_factor(middle(q), &part, target)).sum();
+            let (a, b) = quarter::out_of(number, (1.0 / 3.0, 1.0 / 3.0));
+            sum += factor;
+            moment[0] += factor * (a - 1.0 / 3.0);
+            moment[1] += factor * (b - 1.0 / 3.0);
+        }
+        if sum > 0.0 { moment.map(|m| m / sum) } else { [0.0; 2] }
+    }
+
+    /// The same for a far one, by the slope of cos cos'/r^2 over it.
+    fn moment(&self, target: &Target) -> [f64; 2] {
+        let [p, q, r] = target.corners;
+        let to = middle(&target.corners) - self.middle;
+        let (square, own, other) = (to.dot(to), to.dot(self.receiver.normal), to.dot(target.normal));
+        if square <= 0.0 || own <= 0.0 || other >= 0.0 {
+            return [0.0; 2];
+        }
+        let slope = self.receiver.normal / own + target.normal / other - to * (4.0 / square);
+        let (a, b) = (slope.dot(q - p), slope.dot(r - p));
+        // mean squares of local coordinates are 1/18, their mean product -1/36
+        [(2.0 * a - b) / 36.0, (2.0 * b - a) / 36.0].map(|m| crate::math::clamp(m, -1.0 / 3.0, 2.0 / 3.0))
+    }
+}
+
+fn middle(triangle: &[Vec3; 3]) -> Vec3 {
+    (triangle[0] + triangle[1] + triangle[2]) / 3.0
+}
+
+/// Distance of the farthest corner.
+fn radius(triangle: &[Vec3; 3], from: Vec3) -> f64 {
+    sqrt(triangle.iter().map(|c| (*c - from).length_squared()).fold(0.0, f64::max))
+}
+
+/// A quarter of a triangle.
+fn part_of(triangle: &[Vec3; 3], quarter: usize) -> [Vec3; 3] {
+    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|local| {
+        let (u, v) = quarter::out_of(quarter, local);
+        crate::element::point(triangle, u, v)
+    })
+}
+
+/// One of the 4^levels parts of a triangle.
+fn part_at(triangle: &[Vec3; 3], number: u32, levels: u32) -> [Vec3; 3] {
+    (0..levels).fold(*triangle, |t, level| part_of(&t, (number >> (2 * level) & 3) as usize))
+}
+
+/// Distance of a point from a triangle.
+fn distance(point: Vec3, triangle: &[Vec3; 3]) -> f64 {
+    let [a, b, c] = *triangle;
+    let normal = (b - a).cross(c - a);
+    let inside = |p: Vec3, q: Vec3| (q - p).cross(point - p).dot(normal) >= 0.0;
+    if inside(a, b) && inside(b, c) && inside(c, a) {
+        let height = (point - a).dot(normal);
+        return sqrt(height * height / normal.length_squared().max(f64::MIN_POSITIVE));
+    }
+    let to_side = |p: Vec3, q: Vec3| {
+        let side = q - p;
+        let along = (point - p).dot(side) / side.length_squared().max(f64::MIN_POSITIVE);
+        (point - p - side * crate::math::clamp(along, 0.0, 1.0)).length_squared()
+    };
+    sqrt(to_side(a, b).min(to_side(b, c)).min(to_side(c, a)))
+}
