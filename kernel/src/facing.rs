@@ -7,7 +7,7 @@
 use crate::arena::{Arena, Need};
 use crate::bvh::Bvh;
 use crate::error::Error;
-use crate::index::{Index, IndexMut, pieces};
+use crate::index::{Index, IndexMut, copy, pieces};
 use crate::math::{Vec3, sqrt};
 use crate::mirror::{OFFSET, opens_to_sky};
 use crate::scene::Scene;
@@ -109,7 +109,7 @@ impl<'m> Facing<'m> {
                 insert(shared, facet);
             }
             if sides == 2 {
-                rows.part_mut(words..2 * words).copy_from_slice(behind);
+                copy(rows.part_mut(words..2 * words), behind);
             }
         }
         Ok(Facing { before, screens, shared, words, sides })
@@ -309,9 +309,10 @@ impl Task for Compare<'_> {
     #[inline(always)]
     fn run(self) {
         let Compare { blocks, normal, height, slack, front, behind } = self;
-        let words = front.iter_mut().zip(behind.iter_mut()).zip(blocks.chunks(64 / LANES));
-        for ((front, behind), blocks) in words {
+        for (word, (front, behind)) in front.iter_mut().zip(behind.iter_mut()).enumerate() {
             (*front, *behind) = (0, 0);
+            let start = word * (64 / LANES);
+            let blocks = blocks.part(start..blocks.len().min(start + 64 / LANES));
             for (block, shift) in blocks.iter().zip((0..64).step_by(LANES)) {
                 let (mut high, mut low) = ([0.0; LANES], [0.0; LANES]);
                 let [a, b, c] = block;

@@ -14,7 +14,7 @@
 //! for what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside
 //! a body, and counts or not.
 
-use super::exact::{self, Entries};
+use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
@@ -209,13 +209,13 @@ struct Start {
 struct Tally {
     rays: u32,
     chain_rays: u32,
-    /// Rays that met what is not entered in closed form, and rays that met what is, mirrors among it apart.
+    /// Rays that met what is not entered in closed form; rays of each part that met what is, and mirrors among it.
     blocked: u32,
-    clear: u32,
-    mirrored: u32,
+    clear: [u32; PARTS],
+    mirrored: [[u32; MIRROR_KINDS]; PARTS],
     lost: f64,
-    /// Share of the hemisphere that is entered in closed form.
-    known: f64,
+    /// What is entered in closed form.
+    known: Known,
     /// Rays of each part's parts, and how many of them met a black back first.
     bins: [u32; BINS],
     backs: [u32; BINS],
@@ -231,12 +231,22 @@ impl Tally {
         core::array::from_fn(|bin| some && self.backs.at(bin) < self.bins.at(bin))
     }
 
-    /// By what rays that first met what is not known, or escaped, count, and by what the others do: together as much as
-    /// is not known, and as is.
-    fn kinds(&self) -> [f64; 2] {
-        let (all, clear) = (f64::from(self.rays), f64::from(self.clear));
-        let of = |share: f64, rays: f64| if rays > 0.0 { share.max(0.0) * all / rays } else { 0.0 };
-        if self.known > 0.0 { [of(1.0 - self.known, all - clear), of(self.known, clear)] } else { [1.0; 2] }
+    /// By what a part's rays that first met what is not known, or escaped, count, and by what those that first met known
+    /// mirrors do: together as much as is not known, and as those mirrors fill.
+    fn kinds(&self, part: usize) -> [f64; 1 + MIRROR_KINDS] {
+        let mut kinds = [1.0; 1 + MIRROR_KINDS];
+        if self.known.share() == 0.0 {
+            return kinds;
+        }
+        let rays: u32 = (0..PARTS).map(|bin| self.bins.at(part * PARTS + bin)).sum();
+        let of = |share: f64, of: u32| {
+            if of > 0 { share.max(0.0) * f64::from(rays) / f64::from(of) } else { 0.0 }
+        };
+        let others = of(1.0 - self.known.shares.at(part), rays.saturating_sub(self.clear.at(part)));
+        let known = self.known.mirrored.get(part).into_iter().flatten();
+        let mirrors = known.zip(self.mirrored.get(part).into_iter().flatten()).map(|(s, r)| of(*s, *r));
+        kinds.iter_mut().zip(core::iter::once(others).chain(mirrors)).for_each(|(to, from)| *to = from);
+        kinds
     }
 
     /// Rays of each part's part that did not start inside a body; all where hardly one did not, and then true.
@@ -338,11 +348,13 @@ impl Tracer<'_, '_> {
             isa: self.bvh.isa(),
             directional: self.settings.directional,
             rays: most,
+            sequence: Sequence::new(hash2(start.element as u32, 0x0b17_0000 + start.side as u32)),
+            chosen: 0,
             slopes: slopes(all),
             departures: departures(all),
         };
         tally.known = entries.add(&receiver, self.facing, &clear)?;
-        if tally.known > 1.0 + OVERFULL {
+        if tally.known.share() > 1.0 + OVERFULL {
             self.sink.drop_row();
             return Some(None);
         }
@@ -377,8 +389,12 @@ impl Tracer<'_, '_> {
             let count = (goal - tally.rays).min(GROUP as u32);
             self.batch(start, &mut tally, count, clear)?;
             if tally.rays == goal {
-                // what a mirror shows counts with its reflectance, whose square scales the variance
-                goal = enough(most, goal, f64::from(tally.blocked) + rho * rho * f64::from(tally.mirrored));
+                // what a mirror shows counts with its reflectance
+                goal = enough(
+                    most,
+                    goal,
+                    f64::from(tally.blocked) + rho * f64::from(tally.mirrored.iter().flatten().sum::<u32>()),
+                );
             }
         }
         Some(tally)
@@ -394,7 +410,7 @@ impl Tracer<'_, '_> {
     /// Turns what the parts saw into the row.
     fn end_row(&mut self, tally: &Tally) {
         let (exposed, hidden) = tally.exposed();
-        let closed = tally.known > 0.0;
+        let closed = tally.known.share() > 0.0;
         let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
@@ -422,14 +438,14 @@ impl Tracer<'_, '_> {
             (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
         let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen.max(1));
-        let kinds = tally.kinds();
+        let kinds = [0, 1, 2, 3].map(|part| tally.kinds(part));
         let exposed_all = seen == tally.rays;
         let finish = |mut record: Record| {
-            if let Some(record) = exact::finished(&record) {
+            if let Some(record) = exact::finished(&record, tally.known.scale) {
                 return Some(record);
             }
             let (kind, bin) = (record.gradient[0] as usize / BINS, record.gradient[0] as usize % BINS);
-            let scale = kinds[kind % 2];
+            let scale = kinds.get(bin / PARTS).map_or(1.0, |kinds| kinds.at(kind));
             record.weight *= scale;
             record.moment = record.moment.map(|m| m * scale as f32);
             if exposed[bin] == 0 || (record.is_escape() && record.word() == dropped) {
@@ -522,9 +538,16 @@ impl Tracer<'_, '_> {
                     .zip(surface.as_ref())
                     .is_some_and(|(c, s)| c.has(s.facet, s.side, self.scene.sides()));
             if known {
-                tally.clear += 1;
-                tally.mirrored += u32::from(surface.as_ref().is_some_and(|s| s.mirror(self.scene).is_some()));
-                mark[0] += BINS as f32;
+                if let Some(clear) = tally.clear.get_mut(part) {
+                    *clear += 1;
+                }
+                let kind = surface.as_ref().and_then(|s| mirror_kind(self.scene.mirror(s.material)));
+                if let Some(kind) = kind
+                    && let Some(rays) = tally.mirrored.get_mut(part).and_then(|all| all.get_mut(kind))
+                {
+                    *rays += 1;
+                    mark[0] += ((1 + kind) * BINS) as f32;
+                }
             } else if word == EMPTY {
                 tally.blocked += 1;
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
