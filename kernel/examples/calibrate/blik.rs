@@ -3,6 +3,7 @@
 use super::case::Case;
 use super::pixels::{self, Sampled};
 use crate::kernel;
+use crate::support::twin::Model;
 use blik_kernel::Error;
 use blik_kernel::host::{GeometryMemory, Host, Report, Rounds, Settings};
 use blik_kernel::scene::{Gloss, MaterialInput, SceneInput};
@@ -61,7 +62,8 @@ pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
     let mut rounds = Rounds::new(tolerance);
     let mut memory = GeometryMemory::default();
     loop {
-        let settings = Settings { tolerance: rounds.tolerance(), ..Settings::default() };
+        let directional = case.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform));
+        let settings = Settings { tolerance: rounds.tolerance(), directional, ..Settings::default() };
         let geometry = host.geometry(&mut memory, &input, &settings)?;
         let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
         let mut image = host.image(&lit, &case.camera, false)?;

@@ -12,8 +12,7 @@ use crate::element::Elements;
 use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::index::Index;
-use crate::math::{Vec3, fabs, pow, sqrt};
-use crate::qmc::{Sequence, triangle};
+use crate::math::{Vec3, clamp, fabs, pow, sqrt};
 use crate::quarter::{self, QUARTERS};
 use crate::scene::{NO_MIRROR, Scene};
 use crate::simd::Isa;
@@ -70,13 +69,8 @@ pub(super) struct Entries<'a, 'm> {
     pub elements: &'a Elements<'a>,
     pub sink: &'a mut Sink<'m>,
     pub isa: Isa,
-    /// Whether directions of what is blocked are kept.
-    pub directional: bool,
     /// Rays that such a row would have at most.
     pub rays: u32,
-    /// Chooses the points between which directions are taken, and how many it has chosen.
-    pub sequence: Sequence,
-    pub chosen: u32,
     /// Gradients by what quarters see, and departures from them.
     pub slopes: [[f64; 2]; QUARTERS],
     pub departures: [f64; QUARTERS],
@@ -166,17 +160,13 @@ impl Known {
     }
 }
 
-/// What is left of the light that small elements of a neighbourhood block, until it is a ray's worth.
+/// What entries block of the sky, in whatever direction.
 #[derive(Default)]
 struct Blocked {
     weight: f64,
-    toward: Vec3,
     gradient: [f64; 2],
     departure: f64,
 }
-
-/// Directions that one record may stand for: as far apart as a few rays of the row.
-const TOGETHER: f64 = 4.0;
 
 impl Entries<'_, '_> {
     /// Adds the entries of all that is proven to be clear. `None` where the memory is full.
@@ -214,7 +204,7 @@ impl Entries<'_, '_> {
         for (class, lanes) in lanes.iter_mut().enumerate() {
             self.flush(&place, class, lanes, (&mut known, &mut blocked))?;
         }
-        self.flush_blocked(&mut blocked)?;
+        self.block(&blocked)?;
         if clear.all {
             known.close(error);
         }
@@ -273,45 +263,22 @@ impl Entries<'_, '_> {
         let gradient = self.gradient(&factors);
         let departure: f64 = self.departures.iter().zip(factors).map(|(d, f)| d * f).sum();
         if target.glows {
-            let moment = if near { place.near_moment(target) } else { place.moment(target) };
+            let moment = if near {
+                place.near_moment(target)
+            } else {
+                lean(place.middle, place.receiver.normal, &target.corners, target.normal)
+            };
             self.sink.push(Record {
                 checks: mark(departure),
                 moment: moment.map(|m| (weight * m) as f32),
                 ..Record::target((target.unknown, (0.0, 0.0)), EMPTY, weight, gradient.map(|g| g as f32))
             })?;
         }
-        let parts = if self.directional { weight * f64::from(self.rays) } else { 0.0 };
-        if parts > 1.0 {
-            self.flush_blocked(blocked)?;
-            self.block_parts(place, target, &factors, parts)?;
-            return Some(());
-        }
-        let toward = self.toward(&place.receiver.corners, &target.corners);
-        if self.directional && blocked.is_apart(toward, f64::from(self.rays)) {
-            self.flush_blocked(blocked)?;
-        }
         blocked.weight += weight;
-        blocked.toward += toward * weight;
         blocked.gradient[0] += gradient[0];
         blocked.gradient[1] += gradient[1];
         blocked.departure += departure;
-        if self.directional && blocked.weight * f64::from(self.rays) > 1.0 {
-            self.flush_blocked(blocked)?;
-        }
         Some(())
-    }
-
-    /// The direction from some point of one triangle to some point of another: many such cross a horizon as evenly as
-    /// rays do.
-    fn toward(&mut self, from: &[Vec3; 3], to: &[Vec3; 3]) -> Vec3 {
-        let index = self.chosen & 0xffff;
-        self.chosen = self.chosen.wrapping_add(1);
-        let of = |corners: &[Vec3; 3], (p, q): (f64, f64)| {
-            let (u, v) = triangle(p, q);
-            crate::element::point(corners, u, v)
-        };
-        let start = of(from, self.sequence.pair(index, 2));
-        (of(to, self.sequence.pair(index, 0)) - start).normalize_or_zero()
     }
 
     fn gradient(&self, factors: &[f64; QUARTERS]) -> [f64; 2] {
@@ -322,62 +289,11 @@ impl Entries<'_, '_> {
         gradient
     }
 
-    /// Notes what a target blocks of the sky as some `count` directions of each quarter's to parts of the target.
-    fn block_parts(
-        &mut self,
-        place: &Place<'_>,
-        target: &Target,
-        factors: &[f64; QUARTERS],
-        count: f64,
-    ) -> Option<()> {
-        let mut levels = 0;
-        while levels < MOST_LEVELS && f64::from(8u32 << (2 * levels)) <= count {
-            levels += 1;
-        }
-        let (slopes, departures) = (self.slopes, self.departures);
-        let quarters = place.quarters.iter().zip(factors).zip(slopes.into_iter().zip(departures));
-        for ((quarter, factor), (slopes, departure)) in quarters {
-            let from = middle(quarter);
-            let parts = 1u32 << (2 * levels);
-            let of = |number: u32| part_at(&target.corners, number, levels);
-            let seen = |part: &[Vec3; 3]| place.point_factor(from, part, target);
-            let all: f64 = (0..parts).map(|n| seen(&of(n))).sum();
-            for number in 0..parts {
-                let part = of(number);
-                let share = if all > 0.0 { seen(&part) / all } else { 1.0 / f64::from(parts) };
-                let own = share * factor;
-                if own > 0.0 {
-                    let gradient = slopes.map(|slope| (slope * own) as f32);
-                    let toward = self.toward(quarter, &part);
-                    let record = Record::escape(Some(toward), BLOCKED, 0.25 * own, gradient);
-                    let checks = mark(departure * own);
-                    self.sink.push(Record { checks, ..record })?;
-                }
-            }
-        }
-        Some(())
-    }
-
-    fn flush_blocked(&mut self, blocked: &mut Blocked) -> Option<()> {
-        let Blocked { weight, toward, gradient, departure } = core::mem::take(blocked);
-        if weight > 0.0 {
-            let toward = self.directional.then(|| toward.try_normalize()).flatten();
-            let record = Record::escape(toward, BLOCKED, weight, gradient.map(|g| g as f32));
-            self.sink.push(Record { checks: mark(departure), ..record })?;
-        }
-        Some(())
-    }
-}
-
-/// Times that a target is cut for the directions that it blocks.
-const MOST_LEVELS: u32 = 5;
-
-impl Blocked {
-    /// Whether a direction lies far from those so far.
-    fn is_apart(&self, toward: Vec3, rays: f64) -> bool {
-        let sum = self.toward.length_squared();
-        let cosine = self.toward.dot(toward);
-        self.weight > 0.0 && cosine * cosine < (1.0 - TOGETHER / rays) * sum
+    /// What all entries block of the sky.
+    fn block(&mut self, blocked: &Blocked) -> Option<()> {
+        let gradient = blocked.gradient.map(|g| g as f32);
+        let record = Record::escape(None, BLOCKED, blocked.weight, gradient);
+        self.sink.push(Record { checks: mark(blocked.departure), ..record })
     }
 }
 
@@ -465,20 +381,21 @@ impl Place<'_> {
         }
         if sum > 0.0 { moment.map(|m| m / sum) } else { [0.0; 2] }
     }
+}
 
-    /// The same for a far one, by the slope of cos cos'/r^2 over it.
-    fn moment(&self, target: &Target) -> [f64; 2] {
-        let [p, q, r] = target.corners;
-        let to = middle(&target.corners) - self.middle;
-        let (square, own, other) = (to.dot(to), to.dot(self.receiver.normal), to.dot(target.normal));
-        if square <= 0.0 || own <= 0.0 || other >= 0.0 {
-            return [0.0; 2];
-        }
-        let slope = self.receiver.normal / own + target.normal / other - to * (4.0 / square);
-        let (a, b) = (slope.dot(q - p), slope.dot(r - p));
-        // mean squares of local coordinates are 1/18, their mean product -1/36
-        [(2.0 * a - b) / 36.0, (2.0 * b - a) / 36.0].map(|m| crate::math::clamp(m, -1.0 / 3.0, 2.0 / 3.0))
+/// Where on a triangle, in its local coordinates, light between it and a far point of this normal passes on average, by
+/// the slope of cos cos'/r^2 over it.
+fn lean(point: Vec3, normal: Vec3, corners: &[Vec3; 3], facing: Vec3) -> [f64; 2] {
+    let [p, q, r] = *corners;
+    let to = middle(corners) - point;
+    let (square, own, other) = (to.dot(to), to.dot(normal), to.dot(facing));
+    if square <= 0.0 || own <= 0.0 || other >= 0.0 {
+        return [0.0; 2];
     }
+    let slope = normal / own + facing / other - to * (4.0 / square);
+    let (a, b) = (slope.dot(q - p), slope.dot(r - p));
+    // mean squares of local coordinates are 1/18, their mean product -1/36; a third of the way to the sides at most
+    [(2.0 * a - b) / 36.0, (2.0 * b - a) / 36.0].map(|m| clamp(m, -1.0 / 9.0, 1.0 / 9.0))
 }
 
 fn middle(triangle: &[Vec3; 3]) -> Vec3 {
@@ -498,11 +415,6 @@ fn part_of(triangle: &[Vec3; 3], quarter: usize) -> [Vec3; 3] {
     })
 }
 
-/// One of the 4^levels parts of a triangle.
-fn part_at(triangle: &[Vec3; 3], number: u32, levels: u32) -> [Vec3; 3] {
-    (0..levels).fold(*triangle, |t, level| part_of(&t, (number >> (2 * level) & 3) as usize))
-}
-
 /// Distance of a point from a triangle.
 fn distance(point: Vec3, triangle: &[Vec3; 3]) -> f64 {
     let [a, b, c] = *triangle;
@@ -515,7 +427,7 @@ fn distance(point: Vec3, triangle: &[Vec3; 3]) -> f64 {
     let to_side = |p: Vec3, q: Vec3| {
         let side = q - p;
         let along = (point - p).dot(side) / side.length_squared().max(f64::MIN_POSITIVE);
-        (point - p - side * crate::math::clamp(along, 0.0, 1.0)).length_squared()
+        (point - p - side * clamp(along, 0.0, 1.0)).length_squared()
     };
     sqrt(to_side(a, b).min(to_side(b, c)).min(to_side(c, a)))
 }

@@ -319,6 +319,10 @@ impl Tracer<'_, '_> {
     /// The row with entries in closed form to what nothing hides, and rays for the rest; the inner value is none where
     /// rays alone cost less, or where parts of the element may lie inside a body.
     fn closed(&mut self, start: &Start, normal: Vec3, most: u32) -> Option<Option<Tally>> {
+        if self.settings.directional {
+            // what is hidden of a sky that varies has to be known by direction: rays tell that, and the rest with it
+            return Some(None);
+        }
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
@@ -346,10 +350,7 @@ impl Tracer<'_, '_> {
             elements: self.elements,
             sink: &mut self.sink,
             isa: self.bvh.isa(),
-            directional: self.settings.directional,
             rays: most,
-            sequence: Sequence::new(hash2(start.element as u32, 0x0b17_0000 + start.side as u32)),
-            chosen: 0,
             slopes: slopes(all),
             departures: departures(all),
         };
