@@ -270,8 +270,8 @@ fn a_uniform_sky_needs_no_directions() {
     let settings = Settings { directional: false, ..within(1e-2) };
     let (with, without) = (case.run(2, &within(1e-2), &views()[0]), case.run(2, &settings, &views()[0]));
     for (a, b) in with.image.pixels.iter().zip(&without.image.pixels) {
-        // the same shares, added up in another order
-        assert!((a - b).abs() < 1e-6, "{a} {b}");
+        // rays on one side, closed forms on the other: both within the tolerance
+        assert!((a - b).abs() < 1e-2, "{a} {b}");
     }
     assert!(without.lit.bytes.coupling < with.lit.bytes.coupling);
 }
