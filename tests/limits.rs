@@ -70,7 +70,10 @@ fn without_mirrors_it_is_equation_3() {
                 let mut factors = vec![vec![0.0; unknowns]; unknowns];
                 for (k, row) in coupling.rows(0..unknowns) {
                     row.targets.iter().for_each(|r| factors[k][r.unknown()] += r.weight);
-                    assert!(row.escapes.iter().all(|r| row.depth(r) == 0), "no path by way of a mirror");
+                    assert!(
+                        row.escapes.into_iter().all(|b| row.depth(b.word) == 0),
+                        "no path by way of a mirror"
+                    );
                 }
                 let light =
                     Light { sky: Some(Sky::new(&case.sky.as_ref().unwrap().input(), 1).unwrap()), sun: None };

@@ -15,6 +15,7 @@ use crate::index::{Index, IndexMut, pieces, span};
 use crate::light::Light;
 use crate::radiosity::System;
 use crate::scene::MAX_BANDS;
+use crate::simd::Isa;
 use core::ops::Range;
 
 /// Variance of a linear function through what three quarters see, over that of the mean of all four: of independent
@@ -69,7 +70,7 @@ pub fn carry(
             let part = |values: &[f64], band: usize| values.at(at + band);
             let facet = system.elements.facet_of(record.unknown()).0;
             let diffuse = system.scene.diffuse(system.scene.material(facet));
-            let terms = diffuse.iter().zip(row.products(record)).enumerate();
+            let terms = diffuse.iter().zip(row.products(record.word())).enumerate();
             for (out, (band, (rho, product))) in out.iter_mut().zip(terms) {
                 *out += record.weight * rho * product * (part(differences, band) + part(from, band));
             }
@@ -146,25 +147,21 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     for record in row.targets {
         let start = record.unknown() * bands;
         let seen = radiance.part(start..start + bands);
-        add(sums, record.checks, seen.iter().zip(row.products(record)).map(|(l, p)| l * p));
+        add(sums, record.checks, seen.iter().zip(row.products(record.word())).map(|(l, p)| l * p));
     }
 }
 
 fn add_sky(row: &RowView<'_>, light: &Light<'_>, sums: &mut [[f64; 4]]) {
     let Some(sky) = &light.sky else { return };
+    let isa = Isa::detect();
     let mut radiance = [0.0; MAX_BANDS];
     let radiance = radiance.head_mut(sums.len());
-    let uniform = sky.is_uniform();
-    if uniform {
-        sky.radiance(crate::math::Vec3::Z, radiance);
-    }
-    for record in row.escapes {
-        if !uniform {
-            sky.radiance(record.direction(), radiance);
+    for bundle in row.escapes {
+        sky.sum(bundle.packed, isa, radiance);
+        match bundle.word {
+            BLOCKED if row.row.state != ENCLOSED => radiance.iter_mut().for_each(|l| *l = -*l),
+            word => radiance.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
         }
-        let share = if record.word() == BLOCKED && row.row.state != ENCLOSED { -1.0 } else { 1.0 };
-        let products = row.products(record);
-        let of = |(band, l): (usize, &f64)| share * l * products.get(band).copied().unwrap_or(1.0);
-        add(sums, record.checks, radiance.iter().enumerate().map(of));
+        add(sums, bundle.checks, radiance.iter().copied());
     }
 }

@@ -217,9 +217,9 @@ pub fn add(
             if exposed == 0.0 {
                 continue;
             }
-            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record), l)) {
+            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.word()), l)) {
                 let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
-                for (band, (e, product)) in mean.iter_mut().zip(row.products(record)).enumerate() {
+                for (band, (e, product)) in mean.iter_mut().zip(row.products(record.word())).enumerate() {
                     let irradiance = sun.irradiance(band) * product * (record.weight / exposed);
                     *e += irradiance;
                     if image != 0 {

@@ -5,6 +5,7 @@
 //! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
 
 mod bake;
+pub mod bundle;
 mod exact;
 pub mod pack;
 pub mod rows;
@@ -16,12 +17,14 @@ use crate::element::Local;
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::Vec3;
-use crate::octahedron;
+use crate::octahedron::{self, SKY_BITS};
+use bundle::Bundles;
 use core::ops::Range;
 use word::Word;
 
 plain_struct! {
-    /// One term of a row. The gradient is how the weight varies over the element, in local coordinates.
+    /// One term of a row, escapes only while it grows: then they are put in [`bundle`]s. The gradient is how the weight
+    /// varies over the element, in local coordinates.
     pub struct Record {
         /// Bit 63: an escape; bits 16..: target unknown (32 bits) or direction; bits 0..16: word.
         pub key: u64,
@@ -42,7 +45,7 @@ plain_struct! {
     pub struct Row {
         /// First record.
         pub start: u32,
-        /// First escape among the records.
+        /// First record in whose place escapes stand.
         pub escapes: u32,
         /// [`ABSENT`], [`OPEN`], [`TRACED`] or [`ENCLOSED`].
         pub state: u32,
@@ -103,10 +106,10 @@ impl Record {
         Record { key, weight, gradient, checks: [0.0; 4], moment }
     }
 
-    /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
+    /// The sky seen along a word in `direction` (kept to 6.6e-5 rad), or in any direction.
     #[inline(always)]
     pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
-        let packed = direction.map_or(0, octahedron::pack::<BITS>);
+        let packed = direction.map_or(0, octahedron::pack::<SKY_BITS>);
         Record {
             key: ESCAPE | packed << 16 | u64::from(word),
             weight,
@@ -171,15 +174,12 @@ impl Record {
         same
     }
 
-    /// The direction of an escape.
+    /// The direction of an escape, packed.
     #[inline(always)]
-    pub fn direction(&self) -> Vec3 {
-        octahedron::unpack::<BITS>((self.key & !ESCAPE) >> 16)
+    fn packed(&self) -> u32 {
+        (self.key >> 16) as u32
     }
 }
-
-/// Bits of each coordinate of an escape's direction: error below 4e-7 rad.
-const BITS: u32 = 23;
 
 /// A block of finished rows.
 #[derive(Clone, Copy, Debug)]
@@ -258,7 +258,7 @@ pub struct RowView<'m> {
     pub targets: &'m [Record],
     /// Terms that end in the sky by way of mirrors, and the blocked or (where the row is [`ENCLOSED`]) the open part
     /// of the hemisphere.
-    pub escapes: &'m [Record],
+    pub escapes: Bundles<'m>,
     words: &'m [Word],
     products: &'m [f64],
     bands: usize,
@@ -269,21 +269,21 @@ impl<'m> RowView<'m> {
     pub fn blocked(&self) -> f64 {
         let enclosed = self.row.state == ENCLOSED;
         let word = if enclosed { word::EMPTY } else { BLOCKED };
-        let kept = self.escapes.iter().filter(|r| r.word() == word).map(|r| r.weight).sum();
+        let kept = self.escapes.filter(|b| b.word == word).map(|b| b.total()).sum();
         if enclosed { 1.0 - kept } else { kept }
     }
 
-    /// Products of the mirror reflectances of a record's word, one per band.
+    /// Products of the mirror reflectances of a word, one per band; nothing of [`BLOCKED`].
     #[inline(always)]
-    pub fn products(&self, record: &Record) -> &'m [f64] {
-        let at = record.word() as usize * self.bands;
+    pub fn products(&self, word: u16) -> &'m [f64] {
+        let at = word as usize * self.bands;
         self.products.get(at..at + self.bands).unwrap_or(&[])
     }
 
-    /// Mirrors that a record's path met.
+    /// Mirrors that the paths of a word met.
     #[inline(always)]
-    pub fn depth(&self, record: &Record) -> u32 {
-        self.words.get(record.word() as usize).map_or(0, |w| w.depth)
+    pub fn depth(&self, word: u16) -> u32 {
+        self.words.get(word as usize).map_or(0, |w| w.depth)
     }
 }
 
@@ -362,7 +362,7 @@ fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
     RowView {
         row,
         targets: block.records.part(row.start as usize..row.escapes as usize),
-        escapes: block.records.part(row.escapes as usize..next.start as usize),
+        escapes: Bundles::new(block.records.part(row.escapes as usize..next.start as usize)),
         words: block.words,
         products: block.products,
         bands: block.head.bands as usize,

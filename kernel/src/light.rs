@@ -12,6 +12,7 @@ use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{MAX_BANDS, Scene};
+use crate::simd::Isa;
 use crate::sky::Sky;
 use crate::sun::Sun;
 use core::ops::Range;
@@ -135,6 +136,7 @@ pub fn sky_rows(
         return Err(Error::Mismatch { what: "coupling without directions" });
     }
     let bands = shape.bands.clamp(1, MAX_BANDS);
+    let isa = Isa::detect();
     let mut unobstructed = [0.0; MAX_BANDS];
     let mut of = None;
     for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
@@ -143,49 +145,39 @@ pub fn sky_rows(
             continue;
         }
         let (facet, side) = elements.facet_of(unknown);
-        if of != Some((facet, side)) {
-            sky.irradiance(scene.side_normal(facet, side), relative_error, unobstructed.head_mut(bands));
-            of = Some((facet, side));
-        }
-        for (level, part) in pieces(values, 3 * bands).enumerate() {
-            if row.row.state != ENCLOSED {
-                copy(part.head_mut(bands), &unobstructed);
+        if row.row.state != ENCLOSED {
+            if of != Some((facet, side)) {
+                let normal = scene.side_normal(facet, side);
+                sky.irradiance(normal, relative_error, unobstructed.head_mut(bands));
+                of = Some((facet, side));
             }
-            add_escapes(&row, sky, shape, level, part);
-            part.head_mut(bands).iter_mut().for_each(|e| *e = e.max(0.0));
+            pieces(values, 3 * bands).for_each(|part| copy(part.head_mut(bands), unobstructed.head(bands)));
         }
+        add_escapes(&row, sky, isa, shape, values);
+        pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands)).for_each(|e| *e = e.max(0.0));
     }
     Ok(())
 }
 
 /// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors.
-fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, part: &mut [f64]) {
+fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, isa: Isa, shape: Shape, values: &mut [f64]) {
     let bands = shape.bands.clamp(1, MAX_BANDS);
-    let mut radiance = [0.0; MAX_BANDS];
-    let radiance = radiance.head_mut(bands);
-    let uniform = sky.is_uniform();
-    if uniform {
-        sky.radiance(Vec3::Z, radiance);
-    }
-    let mut parts = pieces(part, bands);
-    let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else { return };
-    for record in row.escapes {
-        if !shape.counts(row.depth(record), level) {
-            continue;
+    let mut sum = [0.0; MAX_BANDS];
+    let sum = sum.head_mut(bands);
+    for bundle in row.escapes {
+        sky.sum(bundle.packed, isa, sum);
+        match bundle.word {
+            BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
+            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= PI * product),
         }
-        if !uniform {
-            sky.radiance(record.direction(), radiance);
-        }
-        let blocked = record.word() == BLOCKED;
-        let products = row.products(record);
-        let g = record.gradient.map(f64::from);
-        let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut()));
-        for (band, ((mean, (first, second)), radiance)) in sums.zip(radiance.iter()).enumerate() {
-            let share = if blocked { -1.0 } else { products.at(band) };
-            let l = PI * share * radiance;
-            *mean += l * record.weight;
-            *first += l * g[0];
-            *second += l * g[1];
+        let depth = row.depth(bundle.word);
+        let [a, b] = bundle.gradient.map(f64::from);
+        for (_, part) in
+            pieces(values, 3 * bands).enumerate().filter(|(level, _)| shape.counts(depth, *level))
+        {
+            for (part, factor) in pieces(part, bands).zip([bundle.weight, a, b]) {
+                part.iter_mut().zip(&*sum).for_each(|(to, l)| *to += l * factor);
+            }
         }
     }
 }

@@ -40,7 +40,7 @@ impl System<'_> {
             let diffuse = self.scene.diffuse(self.material(unknown));
             let mut sums = [0.0; MAX_BANDS];
             for record in row.targets {
-                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
+                sums.iter_mut().zip(row.products(record.word())).for_each(|(s, p)| *s += record.weight * p);
             }
             for (sum, rho) in sums.iter().zip(diffuse) {
                 largest = f64::max(largest, sum * rho);
@@ -106,7 +106,7 @@ impl System<'_> {
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
             let mut sums = [0.0; MAX_BANDS];
             for record in row.targets {
-                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
+                sums.iter_mut().zip(row.products(record.word())).for_each(|(s, p)| *s += record.weight * p);
             }
             let diffuse = self.scene.diffuse(self.material(unknown));
             out.iter_mut().zip(diffuse).zip(sums).for_each(|((out, rho), sum)| *out = 1.0 - rho * sum);
@@ -170,7 +170,7 @@ impl System<'_> {
             let share = if blocked > 0.5 { 1.0 - blocked } else { blocked };
             let mut square = sky.map(|l| (PI * l) * (PI * l) * share);
             for record in row.targets {
-                let depth = row.depth(record);
+                let depth = row.depth(record.word());
                 if !self.shape.counts(depth, level) {
                     continue;
                 }
@@ -179,7 +179,7 @@ impl System<'_> {
                 let seen = radiance(from).part(start..start.wrapping_add(bands));
                 let g = record.gradient.map(f64::from);
                 let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut square);
-                let terms = row.products(record).iter().zip(seen);
+                let terms = row.products(record.word()).iter().zip(seen);
                 for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
                     let l = PI * product * seen;
                     *mean += l * record.weight;
@@ -204,7 +204,7 @@ impl System<'_> {
                 let seen = irradiance.part(self.shape.at(record.unknown(), 0));
                 let diffuse = self.scene.diffuse(self.material(record.unknown()));
                 let (first, second) = (seen.part(bands..2 * bands), seen.part(2 * bands..3 * bands));
-                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record));
+                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record.word()));
                 for (out, (((a, b), rho), product)) in out.iter_mut().zip(slopes) {
                     let [at, bt] = record.moment.map(f64::from);
                     *out += product * rho * (a * at + b * bt);
@@ -265,7 +265,7 @@ fn bounced(row: &RowView<'_>, from: &[f64], bands: usize) -> [f64; MAX_BANDS] {
     for record in row.targets {
         let first = record.unknown() * bands;
         let seen = from.part(first..first.wrapping_add(bands));
-        let terms = seen.iter().zip(row.products(record));
+        let terms = seen.iter().zip(row.products(record.word()));
         bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
     }
     bounced

@@ -85,6 +85,8 @@ pub trait Lanes: Copy {
     fn same8(self, a: &[u32; 8], x: u32) -> u32;
     fn none8(self) -> Self::M8;
     fn marks8(self, marks: Self::M8) -> [u32; 8];
+    /// Square roots, correctly rounded.
+    fn roots4(self, x: [f64; 4]) -> [f64; 4];
 }
 
 /// A computation in explicit lanes; `run` must be `#[inline(always)]`.
@@ -192,6 +194,10 @@ impl Lanes for Arrays {
     fn marks8(self, marks: [u32; 8]) -> [u32; 8] {
         marks
     }
+    #[inline(always)]
+    fn roots4(self, x: [f64; 4]) -> [f64; 4] {
+        x.map(crate::math::sqrt)
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -281,6 +287,12 @@ mod avx2 {
         #[inline(always)]
         fn marks8(self, marks: __m256) -> [u32; 8] {
             self.store8(marks).map(f32::to_bits)
+        }
+        #[inline(always)]
+        fn roots4(self, mut x: [f64; 4]) -> [f64; 4] {
+            // SAFETY: `self` proves AVX2; the array has as many bytes as the register, and no alignment is asked.
+            unsafe { _mm256_storeu_pd(x.as_mut_ptr(), _mm256_sqrt_pd(_mm256_loadu_pd(x.as_ptr()))) };
+            x
         }
     }
 }

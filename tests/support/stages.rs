@@ -228,7 +228,7 @@ pub fn run(
     let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
     for (_, row) in coupling.rows(0..counts.unknowns) {
         counts.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
-        counts.records += row.targets.len() + row.escapes.len();
+        counts.records += row.targets.len() + row.escapes.map(|b| b.packed.len()).sum::<usize>();
     }
 
     let light = Light {
