@@ -21,7 +21,7 @@ fn shares(row: &RowView<'_>) -> Shares {
     let sum = |records: &mut dyn Iterator<Item = f64>| records.sum::<f64>();
     Shares {
         straight: sum(&mut row.targets.iter().filter(|r| row.depth(r.word()) == 0).map(|r| r.weight)),
-        blocked: row.blocked(),
+        blocked: row.row.blocked,
         mirrored: sum(&mut row
             .targets
             .iter()

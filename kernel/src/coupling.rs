@@ -58,6 +58,8 @@ plain_struct! {
         pub exposed: f32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
+        /// Share of the hemisphere in which straight rays meet facets.
+        pub blocked: f64,
     }
 }
 
@@ -265,19 +267,41 @@ pub struct RowView<'m> {
 }
 
 impl<'m> RowView<'m> {
-    /// Share of the hemisphere in which straight rays meet facets.
-    pub fn blocked(&self) -> f64 {
-        let enclosed = self.row.state == ENCLOSED;
-        let word = if enclosed { word::EMPTY } else { BLOCKED };
-        let kept = self.escapes.filter(|b| b.word == word).map(|b| b.total()).sum();
-        if enclosed { 1.0 - kept } else { kept }
-    }
-
     /// Products of the mirror reflectances of a word, one per band; nothing of [`BLOCKED`].
     #[inline(always)]
     pub fn products(&self, word: u16) -> &'m [f64] {
         let at = word as usize * self.bands;
         self.products.get(at..at + self.bands).unwrap_or(&[])
+    }
+
+    /// Sum over the targets of their shares times `values`, of which there are `sums.len()`, one of each band, for each
+    /// unknown, into `sums`.
+    #[inline(always)]
+    pub fn gather<T: Copy + Default + Into<f64>>(&self, values: &[T], sums: &mut [f64]) {
+        if let [sum] = sums {
+            *sum = 0.0;
+            for record in self.targets {
+                let product = self.products.at(record.word() as usize);
+                *sum += record.weight * product * values.at(record.unknown()).into();
+            }
+            return;
+        }
+        sums.fill(0.0);
+        for record in self.targets {
+            let first = record.unknown() * sums.len();
+            let own = values.part(first..first.wrapping_add(sums.len()));
+            let terms = own.iter().zip(self.products(record.word()));
+            sums.iter_mut().zip(terms).for_each(|(s, (x, p))| *s += record.weight * p * (*x).into());
+        }
+    }
+
+    /// The same of ones: sum over the targets of their shares.
+    pub fn sums(&self, sums: &mut [f64]) {
+        sums.fill(0.0);
+        for record in self.targets {
+            let products = self.products(record.word());
+            sums.iter_mut().zip(products).for_each(|(s, p)| *s += record.weight * p);
+        }
     }
 
     /// Mirrors that the paths of a word met.
@@ -324,19 +348,12 @@ impl<'m> Coupling<'m> {
     }
 
     /// The rows of a range of unknowns, in order.
-    pub fn rows(&self, range: Range<usize>) -> impl Iterator<Item = (usize, RowView<'m>)> + use<'m> {
+    #[inline]
+    pub fn rows(&self, range: Range<usize>) -> Rows<'m> {
         let first = self.blocks.partition_point(|b| b.range().end <= range.start);
-        self.blocks
-            .iter()
-            .skip(first)
-            .take_while({
-                let end = range.end;
-                move |b| b.range().start < end
-            })
-            .flat_map(move |block| {
-                let part = block.range().start.max(range.start)..block.range().end.min(range.end);
-                part.map(move |unknown| (unknown, row_of(block, unknown)))
-            })
+        let (_, blocks) = self.blocks.split_at(first.min(self.blocks.len()));
+        let start = blocks.first().map_or(range.end, |b| b.range().start.max(range.start));
+        Rows { blocks, next: start, end: range.end }
     }
 
     /// One row; an empty one of state [`ABSENT`] beyond the last.
@@ -356,6 +373,33 @@ impl<'m> Coupling<'m> {
     }
 }
 
+/// The rows of a range of unknowns and which they are, in order.
+#[derive(Clone, Debug)]
+pub struct Rows<'m> {
+    /// Blocks of which rows are left, the present one first.
+    blocks: &'m [Block<'m>],
+    next: usize,
+    end: usize,
+}
+
+impl<'m> Iterator for Rows<'m> {
+    type Item = (usize, RowView<'m>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, RowView<'m>)> {
+        if self.next >= self.end {
+            return None;
+        }
+        while self.next >= self.blocks.first()?.range().end {
+            (_, self.blocks) = self.blocks.split_first()?;
+        }
+        let unknown = self.next;
+        self.next += 1;
+        Some((unknown, row_of(self.blocks.first()?, unknown)))
+    }
+}
+
+#[inline(always)]
 fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
     let at = unknown - block.head.first as usize;
     let (row, next) = (block.rows.at(at), block.rows.at(at + 1));

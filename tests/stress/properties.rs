@@ -60,7 +60,7 @@ proptest! {
                 }).sum();
                 let mirrored = row.escapes.filter(|b| row.depth(b.word) > 0);
                 let through: f64 = mirrored.map(|b| b.total() * row.products(b.word)[0]).sum();
-                let off = kept + through - row.blocked();
+                let off = kept + through - row.row.blocked;
                 let lost = row.row.lost;
                 prop_assert!(off <= ROW.error && off >= -lost - ROW.error, "row {unknown}: {off:.1e}, lost {lost:.1e}");
             }

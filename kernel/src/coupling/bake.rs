@@ -95,6 +95,7 @@ impl<'m> Block<'m> {
             && (0.0..=1.0).contains(&row.exposed)
             && row.lost >= 0.0
             && row.lost.is_finite()
+            && (-1e-6..=2.0 + 1e-6).contains(&row.blocked)
             && targets
                 .iter()
                 .all(|r| !r.is_escape() && r.unknown() < unknowns && known(r.word()) && weighed(r))

@@ -1,7 +1,7 @@
 //! Writes rows of records into a block of caller memory.
 
-use super::word::{Word, Words};
-use super::{BLOCKED, Head, Record, Row, bundle};
+use super::word::{EMPTY, Word, Words};
+use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -160,8 +160,12 @@ impl<'m> Sink<'m> {
         let row = row.head_mut(kept);
         let targets = row.partition_point(|r| !r.is_escape());
         let escapes = self.start + targets;
+        let enclosed = stats.state == ENCLOSED;
+        let word = if enclosed { EMPTY } else { BLOCKED };
+        let own = row.part(targets..kept).iter().filter(|r| r.word() == word).map(|r| r.weight).sum::<f64>();
+        let blocked = if enclosed { 1.0 - own } else { own };
         let packed = bundle::pack(row.part_mut(targets..kept));
-        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..stats });
+        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, blocked, ..stats });
         self.done += 1;
         self.start = escapes + packed;
         self.used = self.start;
