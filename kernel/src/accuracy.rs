@@ -12,11 +12,11 @@
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::error::Error;
 use crate::index::{Index, IndexMut, pieces, span};
-use crate::light::Light;
 use crate::math::clamp;
 use crate::radiosity::System;
 use crate::scene::{MAX_BANDS, Scene};
-use crate::simd::Isa;
+use crate::simd::{self, Isa, LaneTask, Lanes};
+use crate::sky::Sky;
 use core::ops::Range;
 
 /// Variance of a linear function through what three quarters see, over that of the mean of all four: of independent
@@ -63,18 +63,42 @@ pub fn differences(
 ) -> Result<(), Error> {
     let bands = system.shape.bands;
     check(out.len(), span(&range) * bands)?;
-    let isa = Isa::detect();
-    let mut checks = Checks::ZERO;
-    for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
-        let sums = checks.of(&row, system.light, radiance, isa, bands);
-        for ((out, sums), reference) in out.iter_mut().zip(sums).zip(reference) {
-            let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
-            let [first, second, one, other] = sums.map(|s| scale * s);
-            let noise = LINEAR * (first * first + second * second);
-            *out = [narrow(first + second), narrow(noise + DEPARTURE * (one * other).max(0.0))];
+    simd::run_lanes(Isa::detect(), Differences { system, radiance, reference, range, out });
+    Ok(())
+}
+
+/// [`differences`] at work.
+struct Differences<'a, 'o> {
+    system: &'a System<'a>,
+    radiance: &'a [f64],
+    reference: &'a [f64],
+    range: Range<usize>,
+    out: &'o mut [Own],
+}
+
+impl LaneTask for Differences<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Differences { system, radiance, reference, range, out } = self;
+        let bands = system.shape.bands.clamp(1, MAX_BANDS);
+        let (mut checks, mut light) = ([[0.0; 4]; MAX_BANDS], [0.0; MAX_BANDS]);
+        let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
+        for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+            sums.fill([0.0; 4]);
+            add_targets(&row, radiance, sums);
+            if let Some(sky) = &system.light.sky {
+                add_sky(&row, sky, lanes, light, sums);
+            }
+            for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
+                let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
+                let [first, second, one, other] = sums.map(|s| scale * s);
+                let noise = LINEAR * (first * first + second * second);
+                *out = [narrow(first + second), narrow(noise + DEPARTURE * (one * other).max(0.0))];
+            }
         }
     }
-    Ok(())
 }
 
 /// How wrong the radiances of the rows of `range` are by their differences and by what others' errors (`from`, as this
@@ -144,36 +168,15 @@ fn narrow(x: f64) -> f32 {
     clamp(x, f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
-/// A row's checks, each times the light it stands for, summed, by band.
-struct Checks([[f64; 4]; MAX_BANDS]);
-
-impl Checks {
-    const ZERO: Checks = Checks([[0.0; 4]; MAX_BANDS]);
-
-    /// Those of a row: in place, as they are large.
-    #[inline(always)]
-    fn of(
-        &mut self,
-        row: &RowView<'_>,
-        light: &Light<'_>,
-        radiance: &[f64],
-        isa: Isa,
-        bands: usize,
-    ) -> &[[f64; 4]] {
-        let sums = self.0.head_mut(bands);
-        sums.fill([0.0; 4]);
-        add_targets(row, radiance, sums);
-        add_sky(row, light, isa, sums);
-        sums
-    }
-}
-
+/// Adds a row's checks, each times the light it stands for, by band.
+#[inline(always)]
 fn add(sums: &mut [[f64; 4]], checks: [f32; 4], lights: impl Iterator<Item = f64>) {
     for (sum, light) in sums.iter_mut().zip(lights) {
         sum.iter_mut().zip(checks).for_each(|(s, c)| *s += light * f64::from(c));
     }
 }
 
+#[inline(always)]
 fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     let bands = sums.len();
     for record in row.targets {
@@ -183,16 +186,15 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     }
 }
 
-fn add_sky(row: &RowView<'_>, light: &Light<'_>, isa: Isa, sums: &mut [[f64; 4]]) {
-    let Some(sky) = &light.sky else { return };
-    let mut radiance = [0.0; MAX_BANDS];
-    let radiance = radiance.head_mut(sums.len());
+/// `light` has room for a value of each band.
+#[inline(always)]
+fn add_sky<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [[f64; 4]]) {
     for bundle in row.escapes {
-        sky.sum(bundle.packed, isa, radiance);
+        sky.sum(lanes, bundle.packed, light);
         match bundle.word {
-            BLOCKED if row.row.state != ENCLOSED => radiance.iter_mut().for_each(|l| *l = -*l),
-            word => radiance.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
+            BLOCKED if row.row.state != ENCLOSED => light.iter_mut().for_each(|l| *l = -*l),
+            word => light.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
         }
-        add(sums, bundle.checks, radiance.iter().copied());
+        add(sums, bundle.checks, light.iter().copied());
     }
 }

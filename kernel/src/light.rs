@@ -12,7 +12,7 @@ use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
 use crate::scene::{MAX_BANDS, Scene};
-use crate::simd::Isa;
+use crate::simd::{self, Isa, LaneTask, Lanes};
 use crate::sky::Sky;
 use crate::sun::Sun;
 use core::ops::Range;
@@ -135,37 +135,69 @@ pub fn sky_rows(
     if !sky.is_uniform() && !coupling.is_directional() {
         return Err(Error::Mismatch { what: "coupling without directions" });
     }
-    let bands = shape.bands.clamp(1, MAX_BANDS);
-    let isa = Isa::detect();
-    let mut unobstructed = [0.0; MAX_BANDS];
-    let mut of = None;
-    for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
-        values.fill(0.0);
-        if row.row.state == ABSENT {
-            continue;
-        }
-        let (facet, side) = elements.facet_of(unknown);
-        if row.row.state != ENCLOSED {
-            if of != Some((facet, side)) {
-                let normal = scene.side_normal(facet, side);
-                sky.irradiance(normal, relative_error, unobstructed.head_mut(bands));
-                of = Some((facet, side));
-            }
-            pieces(values, 3 * bands).for_each(|part| copy(part.head_mut(bands), unobstructed.head(bands)));
-        }
-        add_escapes(&row, sky, isa, shape, values);
-        pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands)).for_each(|e| *e = e.max(0.0));
-    }
+    simd::run_lanes(
+        Isa::detect(),
+        SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out },
+    );
     Ok(())
 }
 
-/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors.
-fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, isa: Isa, shape: Shape, values: &mut [f64]) {
-    let bands = shape.bands.clamp(1, MAX_BANDS);
-    let mut sum = [0.0; MAX_BANDS];
-    let sum = sum.head_mut(bands);
+/// [`sky_rows`] at work.
+struct SkyRows<'a, 'o> {
+    scene: &'a Scene<'a>,
+    elements: &'a Elements<'a>,
+    coupling: &'a Coupling<'a>,
+    sky: &'a Sky<'a>,
+    relative_error: f64,
+    range: Range<usize>,
+    shape: Shape,
+    out: &'o mut [f64],
+}
+
+impl LaneTask for SkyRows<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out } = self;
+        let bands = shape.bands.clamp(1, MAX_BANDS);
+        let (mut unobstructed, mut sum) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
+        let (unobstructed, sum) = (unobstructed.head_mut(bands), sum.head_mut(bands));
+        let mut of = None;
+        for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
+            values.fill(0.0);
+            if row.row.state == ABSENT {
+                continue;
+            }
+            if row.row.state != ENCLOSED {
+                let own = elements.facet_of(unknown);
+                if of != Some(own) {
+                    sky.irradiance(scene.side_normal(own.0, own.1), relative_error, unobstructed);
+                    of = Some(own);
+                }
+                pieces(values, 3 * bands).for_each(|part| copy(part, unobstructed));
+            }
+            add_escapes(&row, sky, lanes, shape, sum, values);
+            let means = pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands));
+            means.for_each(|e| *e = e.max(0.0));
+        }
+    }
+}
+
+/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors; `sum` has room for a value
+/// of each band.
+#[inline(always)]
+fn add_escapes<L: Lanes>(
+    row: &RowView<'_>,
+    sky: &Sky<'_>,
+    lanes: L,
+    shape: Shape,
+    sum: &mut [f64],
+    values: &mut [f64],
+) {
+    let bands = sum.len();
     for bundle in row.escapes {
-        sky.sum(bundle.packed, isa, sum);
+        sky.sum(lanes, bundle.packed, sum);
         match bundle.word {
             BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
             word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= PI * product),

@@ -28,22 +28,8 @@ pub fn unpack<const BITS: u32>(p: u64) -> Vec3 {
     Vec3::new(x, y, z).normalize()
 }
 
-/// The direction that was packed in twice [`SKY_BITS`] bits, its absolute coordinates adding up to 1: without branches,
-/// for lanes.
-#[inline(always)]
-pub fn unscaled(p: u32) -> (f64, f64, f64) {
-    let step = 2.0 / steps(SKY_BITS);
-    let back = |s: u32| f64::from((s & ((1 << SKY_BITS) - 1)).cast_signed()) * step - 1.0;
-    let (x, y) = (back(p >> SKY_BITS), back(p));
-    let z = 1.0 - fabs(x) - fabs(y);
-    // the lower half is folded over the square's edges: by as much as z falls below 0
-    let over = if z < 0.0 { -z } else { 0.0 };
-    let within = |a: f64| if a < 0.0 { a + over } else { a - over };
-    (within(x), within(y), z)
-}
-
-/// An even number of steps, so that the axes are among them.
-fn steps(bits: u32) -> f64 {
+/// How many steps there are from one side of the square to the other: an even number, so that the axes are among them.
+pub fn steps(bits: u32) -> f64 {
     ((1u64 << bits) - 2) as f64
 }
 
