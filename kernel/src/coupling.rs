@@ -18,6 +18,7 @@ use crate::error::Error;
 use crate::index::Index;
 use crate::math::Vec3;
 use crate::octahedron::{self, SKY_BITS};
+use crate::simd::{self, Isa, Task};
 use bundle::Bundles;
 use core::ops::Range;
 use word::Word;
@@ -286,13 +287,7 @@ impl<'m> RowView<'m> {
             }
             return;
         }
-        sums.fill(0.0);
-        for record in self.targets {
-            let first = record.unknown() * sums.len();
-            let own = values.part(first..first.wrapping_add(sums.len()));
-            let terms = own.iter().zip(self.products(record.word()));
-            sums.iter_mut().zip(terms).for_each(|(s, (x, p))| *s += record.weight * p * (*x).into());
-        }
+        simd::run(Isa::detect(), Gather { row: self, values, sums });
     }
 
     /// The same of ones: sum over the targets of their shares.
@@ -310,6 +305,48 @@ impl<'m> RowView<'m> {
         self.words.get(word as usize).map_or(0, |w| w.depth)
     }
 }
+
+/// [`RowView::gather`] of many bands.
+struct Gather<'a, T> {
+    row: &'a RowView<'a>,
+    values: &'a [T],
+    sums: &'a mut [f64],
+}
+
+impl<T: Copy + Default + Into<f64>> Task for Gather<'_, T> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (bands, targets) = (self.sums.len(), self.row.targets);
+        let (blocks, rest) = self.sums.as_chunks_mut::<BLOCK>();
+        let whole = blocks.len() * BLOCK;
+        for (block, sums) in blocks.iter_mut().enumerate() {
+            let mut own = [0.0; BLOCK];
+            for record in targets {
+                let products = self.row.products(record.word()).get(block * BLOCK..);
+                let values = self.values.get(record.unknown() * bands + block * BLOCK..);
+                let Some((products, values)) = products.zip(values) else { continue };
+                let first = (products.first_chunk::<BLOCK>(), values.first_chunk::<BLOCK>());
+                if let (Some(products), Some(values)) = first {
+                    for i in 0..BLOCK {
+                        own[i] += record.weight * products[i] * values[i].into();
+                    }
+                }
+            }
+            *sums = own;
+        }
+        rest.fill(0.0);
+        for record in targets.iter().filter(|_| whole < bands) {
+            let values = self.values.part(record.unknown() * bands + whole..(record.unknown() + 1) * bands);
+            let terms = self.row.products(record.word()).iter().skip(whole).zip(values);
+            rest.iter_mut().zip(terms).for_each(|(s, (p, x))| *s += record.weight * p * (*x).into());
+        }
+    }
+}
+
+/// Bands whose sums stay in registers.
+const BLOCK: usize = 8;
 
 /// All rows of a scene.
 #[derive(Clone, Copy, Debug)]
