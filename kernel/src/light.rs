@@ -3,7 +3,7 @@
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
 
-use crate::bvh::{Ahead, Bvh};
+use crate::bvh::Bvh;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
@@ -11,6 +11,7 @@ use crate::index::{Index, IndexMut, copy, pieces, span};
 use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
+use crate::ray::Ray;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::simd::{self, Isa, LaneTask, Lanes};
 use crate::sky::Sky;
@@ -217,6 +218,9 @@ fn add_escapes<L: Lanes>(
 /// Points on an element at which the sun is tested: all of the first share agree, or all are taken.
 const SUN_POINTS: (u32, u32) = (16, 128);
 
+/// Rays toward the sun that are traced together.
+const SUN_BATCH: usize = 32;
+
 /// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
 /// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
 pub fn sun_rows(
@@ -232,6 +236,8 @@ pub fn sun_rows(
         return Err(Error::Length { what: "sun table", expected: span(&range), given: out.len() });
     }
     let mut rays = 0;
+    let mut toward = [Ray::new(Vec3::ZERO, Vec3::Z); SUN_BATCH];
+    let (mut shares, mut hidden) = ([0.0; SUN_BATCH], [false; SUN_BATCH]);
     for ((unknown, row), value) in coupling.rows(range).zip(out) {
         let (facet, side) = elements.facet_of(unknown);
         let normal = scene.side_normal(facet, side);
@@ -246,23 +252,28 @@ pub fn sun_rows(
         }
         let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
         let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
-        let mut ahead = Ahead::default();
-        let leave = |n| {
-            let (p, q) = sequence.pair(n, 0);
-            let (a, b) = triangle(p, q);
-            let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
-            let (s, t) = sequence.pair(n, 2);
-            Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t))
-        };
         while count < goal {
-            let ray = leave(count);
-            let share = sun.share(ray.direction, normal);
-            if share > 0.0 {
-                all += share;
-                let any = |n| if n == count { ray } else { leave(n) };
-                lit += if bvh.occluded_of(&mut ahead, count, goal, any) { 0.0 } else { share };
+            let batch = (goal - count).min(SUN_BATCH as u32);
+            let mut kept = 0;
+            for n in count..count + batch {
+                let (p, q) = sequence.pair(n, 0);
+                let (a, b) = triangle(p, q);
+                let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
+                let (s, t) = sequence.pair(n, 2);
+                let ray = Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t));
+                let share = sun.share(ray.direction, normal);
+                if share > 0.0 {
+                    toward.set(kept, ray);
+                    shares.set(kept, share);
+                    kept += 1;
+                }
             }
-            count += 1;
+            bvh.occluded_many(toward.head(kept), hidden.head_mut(kept));
+            for (share, hidden) in shares.head(kept).iter().zip(&hidden) {
+                all += share;
+                lit += if *hidden { 0.0 } else { *share };
+            }
+            count += batch;
             if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
                 goal = SUN_POINTS.1;
             }
