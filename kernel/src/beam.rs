@@ -208,10 +208,11 @@ impl Tracer<'_, '_> {
         if self.sink.words.largest(chain.word) < self.settings.cutoff {
             return Some(None);
         }
-        chain.axis = chain.axis.filter(|_| mirror.lobe.is_none()).map(|axis| reflect(axis, surface.normal));
-        let (s, t) = lobe_point(sequence, chain.index, depth);
+        let lobe = mirror.lobe.is_some();
+        chain.axis = chain.axis.filter(|_| !lobe).map(|axis| reflect(axis, surface.normal));
+        let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
         let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
-        let flat = mirror.lobe.is_none() && !scene.is_smooth();
+        let flat = !lobe && !scene.is_smooth();
         chain.flux *= share * turned(surface.normal, leaving, chain.arrival, flat);
         (chain.direction, chain.arrival) = (leaving, Some(leaving));
         Some(Some(surface.leave(leaving)))
