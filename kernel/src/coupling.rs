@@ -388,7 +388,7 @@ impl<'m> Coupling<'m> {
     #[inline]
     pub fn rows(&self, range: Range<usize>) -> Rows<'m> {
         let first = self.blocks.partition_point(|b| b.range().end <= range.start);
-        let (_, blocks) = self.blocks.split_at(first.min(self.blocks.len()));
+        let blocks = self.blocks.get(first..).unwrap_or(&[]);
         let start = blocks.first().map_or(range.end, |b| b.range().start.max(range.start));
         Rows { blocks, next: start, end: range.end }
     }

@@ -6,7 +6,7 @@
 
 use super::Record;
 use crate::arena;
-use crate::index::{Index, IndexMut};
+use crate::index::{Index, IndexMut, copy};
 use crate::math::Vec3;
 use crate::octahedron::{self, SKY_BITS};
 use core::cmp::Ordering;
@@ -114,9 +114,10 @@ pub(super) fn pack(escapes: &mut [Record]) -> usize {
         // one record makes 11 words of its 14 at most: what is written has been read
         let words = arena::words_mut(escapes);
         let next = head(&record);
-        if at == 0 || next != own {
+        // one by one: a comparison of arrays is a call
+        if at == 0 || next.iter().zip(&own).any(|(a, b)| a != b) {
             (last, own) = (at, next);
-            words.part_mut(at..at + HEAD).copy_from_slice(&own);
+            copy(words.part_mut(at..at + HEAD), &own);
             at += HEAD;
         }
         words.set(last, words.at(last) + 1);
@@ -126,4 +127,47 @@ pub(super) fn pack(escapes: &mut [Record]) -> usize {
     let needed = at.div_ceil(WORDS);
     arena::words_mut(escapes).part_mut(at..needed * WORDS).fill(0);
     needed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_come_back_from_bundles() {
+        let escape = |i: u32| {
+            let angle = f64::from(i) * 0.37;
+            let direction = Vec3::new(angle.cos(), angle.sin(), 0.3).normalize();
+            let record = Record::escape(Some(direction), (i % 3) as u16, 0.25, [i as f32 % 2.0, 1.0]);
+            Record { checks: [0.5, -0.0, 0.0, i as f32 % 2.0], ..record }
+        };
+        for count in [0, 1, 2, 40] {
+            let mut records = [Record::default(); 40];
+            records.iter_mut().zip(0..).for_each(|(record, i)| *record = escape(i));
+            let records = &mut records[..count];
+            records.sort_by(|a, b| a.word().cmp(&b.word()).then(order(a, b)));
+            let mut before = [Record::default(); 40];
+            before[..count].copy_from_slice(records);
+            let needed = pack(records);
+            assert!(needed <= count && (count < 40 || needed < 10), "{needed} for {count}");
+            let bundles = Bundles::new(&records[..needed]);
+            let mut before = before[..count].iter();
+            for bundle in bundles {
+                for packed in bundle.packed {
+                    let record = before.next().unwrap();
+                    let own = Record { key: record.key, weight: bundle.weight, ..Record::default() };
+                    let own = Record { gradient: bundle.gradient, checks: bundle.checks, ..own };
+                    assert_eq!(&own, record);
+                    assert_eq!((bundle.word, *packed), (record.word(), record.packed()));
+                }
+                // as far apart as directions are rounded
+                let (kept, given) =
+                    (bundle.directions().next().unwrap(), Vec3::new(0.0, 0.0, 0.3 / 1.09f64.sqrt()));
+                assert!((kept.z - given.z).abs() < 6.6e-5);
+            }
+            assert!(before.next().is_none());
+            assert!(bundles.rest().iter().all(|word| *word == 0));
+            assert_eq!(bundles.count(), if count == 40 { 6 } else { count });
+        }
+    }
 }

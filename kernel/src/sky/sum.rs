@@ -182,7 +182,8 @@ mod tests {
                 }
                 let packed = &packed[..count];
                 let (mut wanted, mut own) = ([0.0; 2], [0.0; 2]);
-                for direction in packed.iter().map(unpack) {
+                for packed in packed {
+                    let direction = octahedron::unpack::<SKY_BITS>(u64::from(*packed));
                     sky.radiance(direction, &mut own);
                     (0..2).for_each(|band| wanted[band] += own[band]);
                 }
