@@ -101,15 +101,18 @@ fn heights<L: Lanes>(lanes: L, packed: &[u32], up: Vec3) -> Sums {
 fn add<L: Lanes>(lanes: L, packed: &[u32; N], up: [L::F8; 3], before: usize, sums: &mut [L::F8; 3]) {
     const PLACES: [f32; N] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
     let (zero, steps) = (lanes.splat8(0.0), lanes.splat8(octahedron::steps(SKY_BITS) as f32));
-    let size = |a| lanes.max8(a, lanes.sub8(zero, a));
+    let negative = |a| lanes.sub8(zero, a);
     // in whole half steps, exactly
     let (x, y) = lanes.halves8(packed);
     let [x, y] = [x, y].map(|a| lanes.sub8(lanes.add8(a, a), steps));
-    let z = lanes.sub8(lanes.sub8(steps, size(x)), size(y));
+    let sizes = [x, y].map(|a| lanes.max8(a, negative(a)));
+    let z = lanes.sub8(lanes.sub8(steps, sizes[0]), sizes[1]);
     // the lower half is folded over the square's edges: by as much as z falls below 0
-    let over = lanes.max8(lanes.sub8(zero, z), zero);
-    let within = |a| lanes.choose8(lanes.mask8(zero, a), lanes.sub8(a, over), lanes.add8(a, over));
-    let [x, y] = [within(x), within(y)];
+    let over = lanes.max8(negative(z), zero);
+    let [x, y] = [(x, sizes[0]), (y, sizes[1])].map(|(a, size)| {
+        let within = lanes.sub8(size, over);
+        lanes.choose8(lanes.mask8(zero, a), within, negative(within))
+    });
     let dot = |a: [L::F8; 3], b: [L::F8; 3]| {
         let [x, y, z] = [0, 1, 2].map(|i| lanes.mul8(a[i], b[i]));
         lanes.add8(lanes.add8(x, y), z)
