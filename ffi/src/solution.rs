@@ -268,7 +268,9 @@ impl Sizes {
     /// What is needed to make it; the beams of each lane.
     fn bytes(&self) -> Result<usize, blik_error> {
         let all = self.kept().and::<f64>(self.unknowns * self.shape.stride());
-        let all = all.and::<f64>(self.unknowns * self.shape.bands * self.orders).and::<u8>(self.beams);
+        let values = self.unknowns * self.shape.bands;
+        let all = all.and::<f64>(values * self.orders).and::<accuracy::Own>(values).and::<f32>(2 * values);
+        let all = all.and::<u8>(self.beams);
         let size = all.bytes()?.checked_add(head::<blik_solution>());
         size.ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).sizes(usize::MAX, 0))
     }
@@ -353,6 +355,8 @@ fn build(
     let (slots, thrown) = (arena.take::<u64>(sizes.images.0)?, arena.take::<f64>(sizes.images.1)?);
     let direct = arena.take::<f64>(unknowns * shape.stride())?;
     let orders = arena.take::<f64>(unknowns * shape.bands * sizes.orders)?;
+    let own = arena.take::<accuracy::Own>(unknowns * shape.bands)?;
+    let carried = arena.take::<f32>(2 * unknowns * shape.bands)?;
     let scratch = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
 
     let matrix = coupling.matrix()?;
@@ -361,12 +365,13 @@ fn build(
     let sun_rays = shine.direct(direct, sun, &mut noting, scratch, runner)?;
     let system = System { scene, elements, coupling: &matrix, light: &light, direct: &[], sun: &*sun, shape };
     let settings = &coupling.settings;
-    let mut before = 0;
+    let (mut before, mut bounds) = (0, None);
     if shape.levels == 1 {
         let first = Solve { system: System { direct, ..system }, settings, reference };
-        before = first.run(orders, irradiance, runner)?.0.map_or(0, |s| s.done);
+        before = first.run(orders, irradiance, &mut bounds, runner)?.0.map_or(0, |s| s.done);
         let internal = blik_error::of(BLIK_ERROR_INTERNAL);
-        let (missed, _) = orders.split_at_mut_checked(unknowns * shape.bands).ok_or(internal)?;
+        let size = unknowns * shape.bands;
+        let missed = orders.get_mut(size..2 * size).ok_or(internal)?;
         runner.rows(missed, shape.bands, 0.0, |range, out| {
             system.slopes(range, irradiance, out);
             Ok(())
@@ -374,13 +379,12 @@ fn build(
         light::add(missed, shape, direct);
     }
     let solve = Solve { system: System { direct, ..system }, settings, reference };
-    let (sweeps, radiance) = solve.run(orders, irradiance, runner)?;
+    let (sweeps, radiance) = solve.run(orders, irradiance, &mut bounds, runner)?;
     policy::check_radiance(radiance, shape.bands)?;
     let images = SunImages { slots, thrown };
     images.take_off(shape, elements.facet_sides(), |unknown| elements.facet_side(unknown), irradiance);
     system.extend(irradiance);
-    // three values of each band in one level at least
-    errors(&system, radiance, reference, direct, variance, runner)?;
+    errors(&system, radiance, reference, (own, carried), variance, runner)?;
     let tables = Tables {
         reference,
         irradiance,
@@ -398,28 +402,27 @@ fn build(
     Ok(place.as_ptr())
 }
 
-/// Expected squared error of each unknown; `scratch` holds three values of each and of each band.
+/// Expected squared error of each unknown; `own` and `carried` hold one and two values of each and of each band.
 fn errors(
     system: &System<'_>,
     radiance: &[f64],
     reference: &[f64],
-    scratch: &mut [f64],
+    (own, carried): (&mut [accuracy::Own], &mut [f32]),
     out: &mut [f32],
     runner: &mut Runner,
 ) -> Result<(), blik_error> {
-    let (bands, size) = (system.shape.bands, system.elements.unknowns() * system.shape.bands);
+    let bands = system.shape.bands;
     let short = blik_error::of(BLIK_ERROR_INTERNAL);
-    let (differences, rest) = scratch.split_at_mut_checked(size).ok_or(short)?;
-    let (mut carried, rest) = rest.split_at_mut_checked(size).ok_or(short)?;
-    let (mut next, _) = rest.split_at_mut_checked(size).ok_or(short)?;
-    runner.rows(differences, bands, 0.0, |range, out| accuracy::differences(system, radiance, range, out))?;
-    carried.fill(0.0);
-    for _ in 0..accuracy::CARRIED {
-        runner
-            .rows(next, bands, 0.0, |range, out| accuracy::carry(system, differences, carried, range, out))?;
+    let (mut carried, mut next) = carried.split_at_mut_checked(own.len()).ok_or(short)?;
+    runner
+        .rows(own, bands, 0.0, |range, out| accuracy::differences(system, radiance, reference, range, out))?;
+    let own = &*own;
+    for number in 0..accuracy::carried(system.scene) {
+        let from = if number > 0 { &*carried } else { &[] };
+        runner.rows(next, bands, 0.0, |range, out| accuracy::carry(system, own, from, range, out))?;
         core::mem::swap(&mut carried, &mut next);
     }
-    runner.rows(out, 1, 0.0, |range, out| accuracy::rows(system, radiance, carried, reference, range, out))
+    runner.rows(out, 1, 0.0, |range, out| accuracy::rows(system, own, carried, range, out))
 }
 
 /// The reference radiance: the caller's, or from the light.
@@ -548,6 +551,13 @@ impl Shine<'_> {
     }
 }
 
+/// What bounds the error of a sweep.
+#[derive(Clone, Copy)]
+struct Bounds {
+    q: f64,
+    inverse: Option<f64>,
+}
+
 /// The linear system at work.
 struct Solve<'a> {
     system: System<'a>,
@@ -556,12 +566,13 @@ struct Solve<'a> {
 }
 
 impl Solve<'_> {
-    /// Fills the table of irradiances; the radiances that the last sweep gave, and how the sweeps went (none where
-    /// orders of reflection are kept apart).
+    /// Fills the table of irradiances, the second time from the radiances before; the radiances that the last sweep gave,
+    /// which stand first of all `orders`, and how the sweeps went (none where orders of reflection are kept apart).
     fn run<'o>(
         &self,
         orders: &'o mut [f64],
         irradiance: &mut [f64],
+        bounds: &mut Option<Bounds>,
         runner: &mut Runner,
     ) -> Result<(Option<Solver>, &'o [f64]), blik_error> {
         let shape = self.system.shape;
@@ -574,7 +585,8 @@ impl Solve<'_> {
         }
         let (from, rest) = orders.split_at_mut_checked(size).ok_or(short)?;
         let (to, history) = rest.split_at_mut_checked(size).ok_or(short)?;
-        let (sweeps, radiance) = self.converge(from, to, history, runner)?;
+        let sweeps = self.converge([&mut *from, to], history, bounds, runner)?;
+        let radiance = &*from;
         runner.rows(irradiance, shape.stride(), SHARES[3], |range, out| {
             self.system.gather(range, 0, |_| radiance, out)
         })?;
@@ -588,48 +600,70 @@ impl Solve<'_> {
         })
     }
 
-    fn converge<'o>(
+    /// Sweeps until the solution, which then stands in the first of both, is good enough.
+    fn converge(
         &self,
-        from: &'o mut [f64],
-        to: &'o mut [f64],
+        [from, to]: [&mut [f64]; 2],
+        history: &mut [f64],
+        bounds: &mut Option<Bounds>,
+        runner: &mut Runner,
+    ) -> Result<Solver, blik_error> {
+        let Settings { tolerance, max_bounces, .. } = *self.settings;
+        let (known, mut before) = (bounds.is_some(), 0);
+        let Bounds { q, inverse } = match bounds {
+            Some(bounds) => *bounds,
+            None => {
+                let (found, sweeps) = self.bounds([&mut *from, &mut *to], history, runner)?;
+                before = sweeps;
+                *bounds.insert(found)
+            }
+        };
+        // a sweep from a solution adds a reflection to all that it has
+        if !known || max_bounces.is_some() {
+            self.start(from, runner)?;
+        }
+        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
+        let ends =
+            self.iterate(&mut solver, [&mut *from, &mut *to], history, runner, |range, from, to, relax| {
+                self.system.relaxed_sweep(range, from, to, self.reference, relax)
+            })?;
+        solver.finish(ends[0], self.reference, max_bounces);
+        if solver.done % 2 == 1 {
+            from.iter_mut().zip(to).for_each(|(from, to)| *from = *to);
+        }
+        solver.done += before;
+        Ok(solver)
+    }
+
+    /// What holds for any light: the contraction of a sweep and, where it needs one, the bound on the inverse; and the
+    /// sweeps that it took.
+    fn bounds(
+        &self,
+        [from, to]: [&mut [f64]; 2],
         history: &mut [f64],
         runner: &mut Runner,
-    ) -> Result<(Solver, &'o [f64]), blik_error> {
+    ) -> Result<(Bounds, u32), blik_error> {
         let largest = Turns::new(0.0);
         runner.ranges(self.system.elements.unknowns(), SHARES[2], |range| {
             let q = self.system.contraction(range);
             largest.with(|all| *all = f64::max(*all, q));
             Ok(())
         })?;
-        let Settings { tolerance, max_bounces, .. } = *self.settings;
-        let (q, mut inverse, mut before) = (largest.into_inner(), None, 0);
+        let q = largest.into_inner();
         let deficits = history.get_mut(..from.len()).unwrap_or_default();
         runner.rows(deficits, self.system.shape.bands, 0.0, |range, out| {
             self.system.deficits(range, out);
             Ok(())
         })?;
-        if Solver::is_closed(q, max_bounces) {
-            from.fill(0.0);
-            let mut unit = Solver::unit();
-            let ends = self.iterate(
-                &mut unit,
-                [&mut *from, &mut *to],
-                history,
-                runner,
-                |range, from, to, relax| self.system.unit_sweep(range, from, to, relax),
-            )?;
-            inverse = Some(unit.inverse(ends[1], q)?);
-            before = unit.done;
+        if !Solver::is_closed(q, self.settings.max_bounces) {
+            return Ok((Bounds { q, inverse: None }, 0));
         }
-        self.start(from, runner)?;
-        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
-        let ends = self.iterate(&mut solver, [from, to], history, runner, |range, from, to, relax| {
-            self.system.relaxed_sweep(range, from, to, self.reference, relax)
+        from.fill(0.0);
+        let mut unit = Solver::unit();
+        let ends = self.iterate(&mut unit, [from, to], history, runner, |range, from, to, relax| {
+            self.system.unit_sweep(range, from, to, relax)
         })?;
-        let [latest, _] = ends;
-        solver.finish(latest, self.reference, max_bounces);
-        solver.done += before;
-        Ok((solver, latest))
+        Ok((Bounds { q, inverse: Some(unit.inverse(ends[1], q)?) }, unit.done))
     }
 
     /// Iterates to the end: the latest solution, and the one before.

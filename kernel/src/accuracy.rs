@@ -12,9 +12,11 @@
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::error::Error;
 use crate::index::{Index, IndexMut, pieces, span};
-use crate::light::Light;
+use crate::math::clamp;
 use crate::radiosity::System;
-use crate::scene::MAX_BANDS;
+use crate::scene::{MAX_BANDS, Scene};
+use crate::simd::{self, Isa, LaneTask, Lanes};
+use crate::sky::Sky;
 use core::ops::Range;
 
 /// Variance of a linear function through what three quarters see, over that of the mean of all four: of independent
@@ -25,91 +27,134 @@ const LINEAR: f64 = 11.0 / 3.0;
 /// quadratic functions at large, 1.8 beside walls, 2.4 for jumps.
 const DEPARTURE: f64 = 2.0;
 
-/// How often [`carry`] is called: in a room of albedo 0.85 a seventh is left out.
-pub const CARRIED: usize = 12;
+/// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
+const MOST_CARRIED: u32 = 12;
 
-/// Half the difference between the halves of each row's rays, for the rows of `range`: irradiance over pi, one value
-/// per band. `radiance` is the solved diffuse radiance of all unknowns.
+/// What the products of [`carry`] leave out, where so few leave out so little.
+const LEFT_OUT: f64 = 5e-3;
+
+/// How often [`carry`] is called, and the products that it and [`rows`] make: each brings at most q of
+/// what the one before did, q the largest diffuse reflectance and what mirrors add to it.
+pub fn carried(scene: &Scene<'_>) -> u32 {
+    let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
+    let (mut products, mut rest) = (1, q);
+    while rest > LEFT_OUT && products < MOST_CARRIED {
+        rest *= q;
+        products += 1;
+    }
+    products
+}
+
+/// What a row's own rays tell of one band, relative to the reference radiance.
+pub type Own = [f32; 2];
+
+/// For the rows of `range`, one of each band: half the difference between the halves of the row's rays, irradiance over
+/// pi; and the expected squared error of the linear function over the element. `radiance` is the solved diffuse
+/// radiance of all unknowns.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
 pub fn differences(
     system: &System<'_>,
     radiance: &[f64],
+    reference: &[f64],
     range: Range<usize>,
-    out: &mut [f64],
+    out: &mut [Own],
 ) -> Result<(), Error> {
     let bands = system.shape.bands;
     check(out.len(), span(&range) * bands)?;
-    let mut checks = Checks::ZERO;
-    for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
-        let sums = checks.of(&row, system.light, radiance, bands);
-        out.iter_mut().zip(sums).for_each(|(o, [first, second, ..])| *o = first + second);
-    }
+    simd::run_lanes(Isa::detect(), Differences { system, radiance, reference, range, out });
     Ok(())
 }
 
-/// What the rows of `range` get of the other rows' differences, and of what those got before (`from`).
+/// [`differences`] at work.
+struct Differences<'a, 'o> {
+    system: &'a System<'a>,
+    radiance: &'a [f64],
+    reference: &'a [f64],
+    range: Range<usize>,
+    out: &'o mut [Own],
+}
+
+impl LaneTask for Differences<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Differences { system, radiance, reference, range, out } = self;
+        let bands = system.shape.bands.clamp(1, MAX_BANDS);
+        let (mut checks, mut light) = ([[0.0; 4]; MAX_BANDS], [0.0; MAX_BANDS]);
+        let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
+        for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+            sums.fill([0.0; 4]);
+            add_targets(&row, radiance, sums);
+            if let Some(sky) = &system.light.sky {
+                add_sky(&row, sky, lanes, light, sums);
+            }
+            for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
+                let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
+                let [first, second, one, other] = sums.map(|s| scale * s);
+                let noise = LINEAR * (first * first + second * second);
+                *out = [narrow(first + second), narrow(noise + DEPARTURE * (one * other).max(0.0))];
+            }
+        }
+    }
+}
+
+/// How wrong the radiances of the rows of `range` are by their differences and by what others' errors (`from`, as this
+/// gives them; empty: none) bring them: times pi, one value of each band, relative to the reference radiance.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
 pub fn carry(
     system: &System<'_>,
-    differences: &[f64],
-    from: &[f64],
+    differences: &[Own],
+    from: &[f32],
     range: Range<usize>,
-    out: &mut [f64],
+    out: &mut [f32],
 ) -> Result<(), Error> {
-    let bands = system.shape.bands;
+    let bands = system.shape.bands.clamp(1, MAX_BANDS);
     check(out.len(), span(&range) * bands)?;
-    for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
-        out.fill(0.0);
-        for record in row.targets {
-            let at = record.unknown() * bands;
-            let part = |values: &[f64], band: usize| values.at(at + band);
-            let facet = system.elements.facet_of(record.unknown()).0;
-            let diffuse = system.scene.diffuse(system.scene.material(facet));
-            let terms = diffuse.iter().zip(row.products(record)).enumerate();
-            for (out, (band, (rho, product))) in out.iter_mut().zip(terms) {
-                *out += record.weight * rho * product * (part(differences, band) + part(from, band));
-            }
+    let mut sums = [0.0; MAX_BANDS];
+    let sums = sums.head_mut(bands);
+    for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+        if !from.is_empty() {
+            row.gather(from, sums);
+        }
+        let diffuse = system.scene.diffuse(system.scene.material(system.elements.facet_of(unknown).0));
+        let own = differences.part(unknown * bands..(unknown + 1) * bands);
+        for (out, ((sum, [own, _]), rho)) in out.iter_mut().zip(sums.iter().zip(own).zip(diffuse)) {
+            *out = narrow(rho * (f64::from(*own) + sum));
         }
     }
     Ok(())
 }
 
-/// Expected squared error of the irradiance over pi of each unknown in `range`, relative to `reference`, in the band
-/// where it is largest: where noise is all there is, up to three times that. `radiance` is the solved diffuse radiance
-/// of all unknowns, `carried` what [`carry`] came to. An element inside a body has its stand-in's.
+/// Expected squared error of the irradiance over pi of each unknown in `range`, relative to the reference radiance, in
+/// the band where it is largest: where noise is all there is, up to three times that. From the [`differences`] of all
+/// unknowns and what [`carry`] came to. An element inside a body has its stand-in's.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
 pub fn rows(
     system: &System<'_>,
-    radiance: &[f64],
-    carried: &[f64],
-    reference: &[f64],
+    differences: &[Own],
+    carried: &[f32],
     range: Range<usize>,
     out: &mut [f32],
 ) -> Result<(), Error> {
+    let bands = system.shape.bands.clamp(1, MAX_BANDS);
     check(out.len(), span(&range))?;
-    let bands = system.shape.bands;
-    let mut checks = Checks::ZERO;
+    let mut sums = [0.0; MAX_BANDS];
+    let sums = sums.head_mut(bands);
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
         let near = system.stand_in(unknown, &row);
         let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
         let (unknown, row) = known.unwrap_or((unknown, row));
-        let sums = checks.of(&row, system.light, radiance, bands);
-        let carried = carried.get(unknown * bands..).unwrap_or(&[]);
-        let mut largest: f64 = 0.0;
-        for (([first, second, one, other], carried), reference) in sums.iter().zip(carried).zip(reference) {
-            if *reference > 0.0 {
-                let noise = LINEAR * (first * first + second * second) + carried * carried;
-                largest =
-                    f64::max(largest, (noise + DEPARTURE * (one * other).max(0.0)) / (reference * reference));
-            }
-        }
-        *out = largest.min(f64::from(f32::MAX)) as f32;
+        row.gather(carried, sums);
+        let own = differences.part(unknown * bands..(unknown + 1) * bands);
+        let square = |(&[_, own], &carried): (&Own, &f64)| f64::from(own) + carried * carried;
+        *out = narrow(own.iter().zip(&*sums).map(square).fold(0.0, f64::max));
     }
     Ok(())
 }
@@ -118,53 +163,38 @@ fn check(given: usize, expected: usize) -> Result<(), Error> {
     if given == expected { Ok(()) } else { Err(Error::Length { what: "errors", expected, given }) }
 }
 
-/// A row's checks, each times the light it stands for, summed, by band.
-struct Checks([[f64; 4]; MAX_BANDS]);
-
-impl Checks {
-    const ZERO: Checks = Checks([[0.0; 4]; MAX_BANDS]);
-
-    /// Those of a row: in place, as they are large.
-    #[inline(always)]
-    fn of(&mut self, row: &RowView<'_>, light: &Light<'_>, radiance: &[f64], bands: usize) -> &[[f64; 4]] {
-        let sums = self.0.head_mut(bands);
-        sums.fill([0.0; 4]);
-        add_targets(row, radiance, sums);
-        add_sky(row, light, sums);
-        sums
-    }
+/// In f32, at most its largest.
+fn narrow(x: f64) -> f32 {
+    clamp(x, f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
+/// Adds a row's checks, each times the light it stands for, by band.
+#[inline(always)]
 fn add(sums: &mut [[f64; 4]], checks: [f32; 4], lights: impl Iterator<Item = f64>) {
     for (sum, light) in sums.iter_mut().zip(lights) {
         sum.iter_mut().zip(checks).for_each(|(s, c)| *s += light * f64::from(c));
     }
 }
 
+#[inline(always)]
 fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     let bands = sums.len();
     for record in row.targets {
         let start = record.unknown() * bands;
         let seen = radiance.part(start..start + bands);
-        add(sums, record.checks, seen.iter().zip(row.products(record)).map(|(l, p)| l * p));
+        add(sums, record.checks, seen.iter().zip(row.products(record.word())).map(|(l, p)| l * p));
     }
 }
 
-fn add_sky(row: &RowView<'_>, light: &Light<'_>, sums: &mut [[f64; 4]]) {
-    let Some(sky) = &light.sky else { return };
-    let mut radiance = [0.0; MAX_BANDS];
-    let radiance = radiance.head_mut(sums.len());
-    let uniform = sky.is_uniform();
-    if uniform {
-        sky.radiance(crate::math::Vec3::Z, radiance);
-    }
-    for record in row.escapes {
-        if !uniform {
-            sky.radiance(record.direction(), radiance);
+/// `light` has room for a value of each band.
+#[inline(always)]
+fn add_sky<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [[f64; 4]]) {
+    for bundle in row.escapes {
+        sky.sum(lanes, bundle.packed, light);
+        match bundle.word {
+            BLOCKED if row.row.state != ENCLOSED => light.iter_mut().for_each(|l| *l = -*l),
+            word => light.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
         }
-        let share = if record.word() == BLOCKED && row.row.state != ENCLOSED { -1.0 } else { 1.0 };
-        let products = row.products(record);
-        let of = |(band, l): (usize, &f64)| share * l * products.get(band).copied().unwrap_or(1.0);
-        add(sums, record.checks, radiance.iter().enumerate().map(of));
+        add(sums, bundle.checks, light.iter().copied());
     }
 }

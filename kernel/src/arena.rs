@@ -61,6 +61,24 @@ plain!(u8, u16, u32, u64, i32, usize, f32, f64, glam::DVec3);
 #[allow(unsafe_code)]
 unsafe impl<T: Plain, const N: usize> Plain for [T; N] {}
 
+/// Plain values as 32-bit words, in the machine's order.
+#[allow(unsafe_code)]
+pub(crate) fn words<T: Plain>(values: &[T]) -> &[u32] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<u32>()) && align_of::<T>() >= align_of::<u32>()) };
+    let count = size_of_val(values) / size_of::<u32>();
+    // SAFETY: the same bytes, all initialised, aligned for words, any bytes of which are one, under the same borrow.
+    unsafe { core::slice::from_raw_parts(values.as_ptr().cast::<u32>(), count) }
+}
+
+/// The same, writable.
+#[allow(unsafe_code)]
+pub(crate) fn words_mut<T: Plain>(values: &mut [T]) -> &mut [u32] {
+    const { assert!(size_of::<T>().is_multiple_of(size_of::<u32>()) && align_of::<T>() >= align_of::<u32>()) };
+    let count = size_of_val(values) / size_of::<u32>();
+    // SAFETY: as above, the borrow is unique, and any bytes are a value of the plain type T.
+    unsafe { core::slice::from_raw_parts_mut(values.as_mut_ptr().cast::<u32>(), count) }
+}
+
 /// Counts the bytes that an [`Arena`] must hold for a series of slices.
 #[derive(Clone, Copy, Debug)]
 pub struct Need {

@@ -24,7 +24,7 @@ use crate::sun::{Sun, SunInput};
 use crate::sun_image::{self, SunImages};
 
 /// Version of the layout; another one is refused.
-pub const VERSION: u64 = 2;
+pub const VERSION: u64 = 3;
 
 /// "BLIKBAKE"; its bytes tell the byte order.
 const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");

@@ -14,11 +14,12 @@ use crate::coupling::word::EMPTY;
 use crate::coupling::{Coupling, Record, Row, TRACED};
 use crate::element::Elements;
 use crate::error::Error;
-use crate::index::Index;
+use crate::index::{Index, IndexMut};
 use crate::light::Shape;
 use crate::math::{Vec3, clamp, reflect};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
+use crate::ray::Ray;
 use crate::scene::{NO_MIRROR, Scene};
 use crate::sun::Sun;
 use crate::sun_image::{Noting, pack};
@@ -118,8 +119,8 @@ impl Tracer<'_, '_> {
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
         let mut fold = FOLD;
-        for index in 0..rays {
-            self.ray(facet, side, &sequence, index, &mut stats)?;
+        for first in (0..rays).step_by(BATCH) {
+            self.rays(facet, side, &sequence, first..rays.min(first + BATCH as u32), &mut stats)?;
             if self.sink.present() >= fold {
                 fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
             }
@@ -130,59 +131,121 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    fn ray(
+    /// The rays of these numbers, at most [`BATCH`], from mirror to mirror together.
+    fn rays(
         &mut self,
         facet: usize,
         side: usize,
         sequence: &Sequence,
-        index: u32,
+        numbers: Range<u32>,
         stats: &mut Row,
     ) -> Option<()> {
-        let scene = self.scene;
-        let (p, q) = sequence.pair(index, 0);
-        let (u, v) = triangle(p, q);
-        let mut surface = Surface::new(scene, facet, side, u, v);
-        let (s, t) = sequence.pair(index, 2);
-        let toward = self.sun.sample(s, t);
-        if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
-            return Some(());
-        }
-        // flux per unit of normal irradiance, the first cosine still to come
-        let (mut flux, mut word, mut arrival) = (scene.areas().at(facet), EMPTY, None);
-        let mut direction = -toward;
-        // the way of the light of the sun's middle, as long as flat mirrors turn it
-        let mut axis = (!scene.is_smooth()).then_some(-self.sun.direction());
-        loop {
-            let Some(mirror) = surface.mirror(scene) else { return Some(()) };
-            let depth = self.sink.words.get(word).depth;
-            if depth >= self.settings.mirrors {
-                return Some(());
+        let (scene, bvh) = (self.scene, self.bvh);
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BATCH];
+        let mut chains: [Option<Chain>; BATCH] = [None; BATCH];
+        let mut count = 0;
+        for index in numbers {
+            let (p, q) = sequence.pair(index, 0);
+            let (u, v) = triangle(p, q);
+            let surface = Surface::new(scene, facet, side, u, v);
+            let (s, t) = sequence.pair(index, 2);
+            let toward = self.sun.sample(s, t);
+            if toward.dot(surface.normal) > 0.0 {
+                // flux per unit of normal irradiance, the first cosine still to come
+                let (flux, word, arrival) = (scene.areas().at(facet), EMPTY, None);
+                let axis = (!scene.is_smooth()).then_some(-self.sun.direction());
+                let chain = Chain { index, surface, direction: -toward, flux, word, arrival, axis };
+                rays.set(count, surface.leave(toward));
+                chains.set(count, Some(chain));
+                count += 1;
             }
-            word = match self.sink.spell(word, mirror.class, scene) {
-                Ok(next) => next,
-                Err(true) => return Some(()),
-                Err(false) => return None,
-            };
-            if self.sink.words.largest(word) < self.settings.cutoff {
-                return Some(());
-            }
-            axis = axis.filter(|_| mirror.lobe.is_none()).map(|axis| reflect(axis, surface.normal));
-            let (s, t) = lobe_point(sequence, index, depth);
-            let (leaving, share) = surface.go_on(scene, &mirror, direction, s, t);
-            flux *=
-                share * turned(surface.normal, leaving, arrival, mirror.lobe.is_none() && !scene.is_smooth());
-            let Some(hit) = self.bvh.closest(&surface.leave(leaving)) else { return Some(()) };
-            stats.chain_rays += 1;
-            let Some(next) = Surface::of_hit(scene, &hit) else { return Some(()) };
-            surface = next;
-            direction = leaving;
-            arrival = Some(direction);
-            let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            let area = scene.areas().at(surface.facet) * self.elements.share(target.0);
-            let image = axis.map_or(0, |axis| pack(-axis));
-            self.sink.push(Record::beam(target, word, flux / area, image))?;
         }
+        let mut hidden = [false; BATCH];
+        bvh.occluded_many(rays.head(count), hidden.head_mut(count));
+        for (chain, _) in chains.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden) {
+            *chain = None;
+        }
+        let mut hits = [None; BATCH];
+        while count > 0 {
+            let mut left = 0;
+            for at in 0..count {
+                let Some(mut chain) = chains.at(at) else { continue };
+                if let Some(ray) = self.mirrored(&mut chain, sequence)? {
+                    rays.set(left, ray);
+                    chains.set(left, Some(chain));
+                    left += 1;
+                }
+            }
+            bvh.closest_many(rays.head(left), hits.head_mut(left));
+            for (chain, hit) in chains.head_mut(left).iter_mut().zip(hits) {
+                let surface = hit.and_then(|hit| {
+                    stats.chain_rays += 1;
+                    Surface::of_hit(scene, &hit)
+                });
+                *chain = chain.zip(surface).map(|(chain, surface)| Chain { surface, ..chain });
+                if let Some(chain) = chain {
+                    self.arrive(chain)?;
+                }
+            }
+            count = left;
+        }
+        Some(())
     }
+
+    /// The ray by which a chain goes on from its mirror, if there is one and it matters.
+    fn mirrored(&mut self, chain: &mut Chain, sequence: &Sequence) -> Option<Option<Ray>> {
+        let (scene, surface) = (self.scene, chain.surface);
+        let Some(mirror) = surface.mirror(scene) else { return Some(None) };
+        let depth = self.sink.words.get(chain.word).depth;
+        if depth >= self.settings.mirrors {
+            return Some(None);
+        }
+        chain.word = match self.sink.spell(chain.word, mirror.class, scene) {
+            Ok(next) => next,
+            Err(true) => return Some(None),
+            Err(false) => return None,
+        };
+        if self.sink.words.largest(chain.word) < self.settings.cutoff {
+            return Some(None);
+        }
+        let lobe = mirror.lobe.is_some();
+        chain.axis = chain.axis.filter(|_| !lobe).map(|axis| reflect(axis, surface.normal));
+        let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
+        let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
+        let flat = !lobe && !scene.is_smooth();
+        chain.flux *= share * turned(surface.normal, leaving, chain.arrival, flat);
+        (chain.direction, chain.arrival) = (leaving, Some(leaving));
+        Some(Some(surface.leave(leaving)))
+    }
+
+    /// Notes what a chain brings to the surface that it has met.
+    fn arrive(&mut self, chain: &Chain) -> Option<()> {
+        let Surface { facet, side, u, v, .. } = chain.surface;
+        let target = self.elements.locate(facet, side, u, v);
+        let area = self.scene.areas().at(facet) * self.elements.share(target.0);
+        let image = chain.axis.map_or(0, |axis| pack(-axis));
+        self.sink.push(Record::beam(target, chain.word, chain.flux / area, image))
+    }
+}
+
+/// Rays of a mirror that are traced together.
+const BATCH: usize = 32;
+
+/// Sunlight on its way from mirror to mirror.
+#[derive(Clone, Copy)]
+struct Chain {
+    /// Number of its ray.
+    index: u32,
+    /// What it has met.
+    surface: Surface,
+    direction: Vec3,
+    /// Per unit of the sun's normal irradiance.
+    flux: f64,
+    word: u16,
+    /// The direction in which it came from the mirror before.
+    arrival: Option<Vec3>,
+    /// The way of the light of the sun's middle, as long as flat mirrors turn it.
+    axis: Option<Vec3>,
 }
 
 /// By how much a beam's flux changes at a mirror beside its reflectance: a mirror keeps radiance, so the flux
@@ -217,9 +280,9 @@ pub fn add(
             if exposed == 0.0 {
                 continue;
             }
-            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record), l)) {
+            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.word()), l)) {
                 let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
-                for (band, (e, product)) in mean.iter_mut().zip(row.products(record)).enumerate() {
+                for (band, (e, product)) in mean.iter_mut().zip(row.products(record.word())).enumerate() {
                     let irradiance = sun.irradiance(band) * product * (record.weight / exposed);
                     *e += irradiance;
                     if image != 0 {

@@ -5,6 +5,7 @@
 //! the numbers of a row do not depend on how rows are grouped into blocks. [`Coupling`] reads the blocks.
 
 mod bake;
+pub mod bundle;
 mod exact;
 pub mod pack;
 pub mod rows;
@@ -16,12 +17,15 @@ use crate::element::Local;
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::Vec3;
-use crate::octahedron;
+use crate::octahedron::{self, SKY_BITS};
+use crate::simd::{self, Isa, Task};
+use bundle::Bundles;
 use core::ops::Range;
 use word::Word;
 
 plain_struct! {
-    /// One term of a row. The gradient is how the weight varies over the element, in local coordinates.
+    /// One term of a row, escapes only while it grows: then they are put in [`bundle`]s. The gradient is how the weight
+    /// varies over the element, in local coordinates.
     pub struct Record {
         /// Bit 63: an escape; bits 16..: target unknown (32 bits) or direction; bits 0..16: word.
         pub key: u64,
@@ -42,7 +46,7 @@ plain_struct! {
     pub struct Row {
         /// First record.
         pub start: u32,
-        /// First escape among the records.
+        /// First record in whose place escapes stand.
         pub escapes: u32,
         /// [`ABSENT`], [`OPEN`], [`TRACED`] or [`ENCLOSED`].
         pub state: u32,
@@ -55,6 +59,8 @@ plain_struct! {
         pub exposed: f32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
         pub lost: f64,
+        /// Share of the hemisphere in which straight rays meet facets.
+        pub blocked: f64,
     }
 }
 
@@ -103,10 +109,10 @@ impl Record {
         Record { key, weight, gradient, checks: [0.0; 4], moment }
     }
 
-    /// The sky seen along a word in `direction` (kept to 1e-7), or in any direction.
+    /// The sky seen along a word in `direction` (kept to 6.6e-5 rad), or in any direction.
     #[inline(always)]
     pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
-        let packed = direction.map_or(0, octahedron::pack::<BITS>);
+        let packed = direction.map_or(0, octahedron::pack::<SKY_BITS>);
         Record {
             key: ESCAPE | packed << 16 | u64::from(word),
             weight,
@@ -171,15 +177,12 @@ impl Record {
         same
     }
 
-    /// The direction of an escape.
+    /// The direction of an escape, packed.
     #[inline(always)]
-    pub fn direction(&self) -> Vec3 {
-        octahedron::unpack::<BITS>((self.key & !ESCAPE) >> 16)
+    fn packed(&self) -> u32 {
+        (self.key >> 16) as u32
     }
 }
-
-/// Bits of each coordinate of an escape's direction: error below 4e-7 rad.
-const BITS: u32 = 23;
 
 /// A block of finished rows.
 #[derive(Clone, Copy, Debug)]
@@ -258,34 +261,92 @@ pub struct RowView<'m> {
     pub targets: &'m [Record],
     /// Terms that end in the sky by way of mirrors, and the blocked or (where the row is [`ENCLOSED`]) the open part
     /// of the hemisphere.
-    pub escapes: &'m [Record],
+    pub escapes: Bundles<'m>,
     words: &'m [Word],
     products: &'m [f64],
     bands: usize,
 }
 
 impl<'m> RowView<'m> {
-    /// Share of the hemisphere in which straight rays meet facets.
-    pub fn blocked(&self) -> f64 {
-        let enclosed = self.row.state == ENCLOSED;
-        let word = if enclosed { word::EMPTY } else { BLOCKED };
-        let kept = self.escapes.iter().filter(|r| r.word() == word).map(|r| r.weight).sum();
-        if enclosed { 1.0 - kept } else { kept }
-    }
-
-    /// Products of the mirror reflectances of a record's word, one per band.
+    /// Products of the mirror reflectances of a word, one per band; nothing of [`BLOCKED`].
     #[inline(always)]
-    pub fn products(&self, record: &Record) -> &'m [f64] {
-        let at = record.word() as usize * self.bands;
+    pub fn products(&self, word: u16) -> &'m [f64] {
+        let at = word as usize * self.bands;
         self.products.get(at..at + self.bands).unwrap_or(&[])
     }
 
-    /// Mirrors that a record's path met.
+    /// Sum over the targets of their shares times `values`, of which there are `sums.len()`, one of each band, for each
+    /// unknown, into `sums`.
     #[inline(always)]
-    pub fn depth(&self, record: &Record) -> u32 {
-        self.words.get(record.word() as usize).map_or(0, |w| w.depth)
+    pub fn gather<T: Copy + Default + Into<f64>>(&self, values: &[T], sums: &mut [f64]) {
+        if let [sum] = sums {
+            *sum = 0.0;
+            for record in self.targets {
+                let product = self.products.at(record.word() as usize);
+                *sum += record.weight * product * values.at(record.unknown()).into();
+            }
+            return;
+        }
+        simd::run(Isa::detect(), Gather { row: self, values, sums });
+    }
+
+    /// The same of ones: sum over the targets of their shares.
+    pub fn sums(&self, sums: &mut [f64]) {
+        sums.fill(0.0);
+        for record in self.targets {
+            let products = self.products(record.word());
+            sums.iter_mut().zip(products).for_each(|(s, p)| *s += record.weight * p);
+        }
+    }
+
+    /// Mirrors that the paths of a word met.
+    #[inline(always)]
+    pub fn depth(&self, word: u16) -> u32 {
+        self.words.get(word as usize).map_or(0, |w| w.depth)
     }
 }
+
+/// [`RowView::gather`] of many bands.
+struct Gather<'a, T> {
+    row: &'a RowView<'a>,
+    values: &'a [T],
+    sums: &'a mut [f64],
+}
+
+impl<T: Copy + Default + Into<f64>> Task for Gather<'_, T> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (bands, targets) = (self.sums.len(), self.row.targets);
+        let (blocks, rest) = self.sums.as_chunks_mut::<BLOCK>();
+        let whole = blocks.len() * BLOCK;
+        for (block, sums) in blocks.iter_mut().enumerate() {
+            let mut own = [0.0; BLOCK];
+            for record in targets {
+                let products = self.row.products(record.word()).get(block * BLOCK..);
+                let values = self.values.get(record.unknown() * bands + block * BLOCK..);
+                let Some((products, values)) = products.zip(values) else { continue };
+                let first = (products.first_chunk::<BLOCK>(), values.first_chunk::<BLOCK>());
+                if let (Some(products), Some(values)) = first {
+                    for i in 0..BLOCK {
+                        own[i] += record.weight * products[i] * values[i].into();
+                    }
+                }
+            }
+            *sums = own;
+        }
+        rest.fill(0.0);
+        for record in targets.iter().filter(|_| whole < bands) {
+            let values = self.values.part(record.unknown() * bands + whole..(record.unknown() + 1) * bands);
+            let terms = self.row.products(record.word()).iter().skip(whole).zip(values);
+            rest.iter_mut().zip(terms).for_each(|(s, (p, x))| *s += record.weight * p * (*x).into());
+        }
+    }
+}
+
+/// Bands whose sums stay in registers.
+const BLOCK: usize = 8;
 
 /// All rows of a scene.
 #[derive(Clone, Copy, Debug)]
@@ -324,19 +385,12 @@ impl<'m> Coupling<'m> {
     }
 
     /// The rows of a range of unknowns, in order.
-    pub fn rows(&self, range: Range<usize>) -> impl Iterator<Item = (usize, RowView<'m>)> + use<'m> {
+    #[inline]
+    pub fn rows(&self, range: Range<usize>) -> Rows<'m> {
         let first = self.blocks.partition_point(|b| b.range().end <= range.start);
-        self.blocks
-            .iter()
-            .skip(first)
-            .take_while({
-                let end = range.end;
-                move |b| b.range().start < end
-            })
-            .flat_map(move |block| {
-                let part = block.range().start.max(range.start)..block.range().end.min(range.end);
-                part.map(move |unknown| (unknown, row_of(block, unknown)))
-            })
+        let blocks = self.blocks.get(first..).unwrap_or(&[]);
+        let start = blocks.first().map_or(range.end, |b| b.range().start.max(range.start));
+        Rows { blocks, next: start, end: range.end }
     }
 
     /// One row; an empty one of state [`ABSENT`] beyond the last.
@@ -356,13 +410,40 @@ impl<'m> Coupling<'m> {
     }
 }
 
+/// The rows of a range of unknowns and which they are, in order.
+#[derive(Clone, Debug)]
+pub struct Rows<'m> {
+    /// Blocks of which rows are left, the present one first.
+    blocks: &'m [Block<'m>],
+    next: usize,
+    end: usize,
+}
+
+impl<'m> Iterator for Rows<'m> {
+    type Item = (usize, RowView<'m>);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, RowView<'m>)> {
+        if self.next >= self.end {
+            return None;
+        }
+        while self.next >= self.blocks.first()?.range().end {
+            (_, self.blocks) = self.blocks.split_first()?;
+        }
+        let unknown = self.next;
+        self.next += 1;
+        Some((unknown, row_of(self.blocks.first()?, unknown)))
+    }
+}
+
+#[inline(always)]
 fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
     let at = unknown - block.head.first as usize;
     let (row, next) = (block.rows.at(at), block.rows.at(at + 1));
     RowView {
         row,
         targets: block.records.part(row.start as usize..row.escapes as usize),
-        escapes: block.records.part(row.escapes as usize..next.start as usize),
+        escapes: Bundles::new(block.records.part(row.escapes as usize..next.start as usize)),
         words: block.words,
         products: block.products,
         bands: block.head.bands as usize,

@@ -119,6 +119,10 @@ impl<'m> Elements<'m> {
     /// Facet and side of an unknown.
     #[inline(always)]
     pub fn facet_of(&self, unknown: usize) -> (usize, usize) {
+        if self.sides == 1 {
+            // without a division
+            return (self.facet.at(unknown) as usize, 0);
+        }
         (self.facet.at(unknown / self.sides.max(1)) as usize, unknown % self.sides.max(1))
     }
 

@@ -111,6 +111,17 @@ pub struct Lit<'g> {
     report: Report,
 }
 
+/// The system while it is solved.
+#[derive(Debug, Default)]
+struct Solving {
+    /// The solution.
+    radiance: Vec<f64>,
+    next: Vec<f64>,
+    history: Vec<f64>,
+    /// As [`Host::bounds`] gives them, once they are known.
+    bounds: Option<(f64, Option<f64>)>,
+}
+
 /// What mirrors throw of the sun.
 #[derive(Debug, Default)]
 struct Suns {
@@ -246,6 +257,16 @@ impl Host {
         sky: Option<&SkyInput<'g>>,
         sun: Option<&SunInput<'g>>,
     ) -> Result<Lit<'g>, Error> {
+        // within the pool at once: each stage of its own would wake and wait for it
+        self.pool.install(|| self.light_within(geometry, sky, sun))
+    }
+
+    fn light_within<'g>(
+        &self,
+        geometry: &'g Geometry<'g>,
+        sky: Option<&SkyInput<'g>>,
+        sun: Option<&SunInput<'g>>,
+    ) -> Result<Lit<'g>, Error> {
         let (scene, elements) = (&geometry.scene, &geometry.elements);
         let bands = scene.bands();
         let mut report = geometry.report.clone();
@@ -284,8 +305,9 @@ impl Host {
         report.seconds.light = clock.lap();
         let (coupling, light) = (&coupling, &light);
         let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
-        let (mut irradiance, mut radiance) =
-            self.solve(&system, &geometry.settings, &reference, &mut report)?;
+        let mut solving = Solving { radiance: std::vec![0.0; unknowns * bands], ..Solving::default() };
+        let mut irradiance =
+            self.solve(&system, &geometry.settings, &reference, &mut solving, &mut report)?;
         if shape.levels == 1 {
             let mut missed = std::vec![0.0; unknowns * bands];
             self.split(&mut missed, bands, |range, out| {
@@ -294,8 +316,9 @@ impl Host {
             })?;
             light::add(&missed, shape, &mut direct);
             let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
-            (irradiance, radiance) = self.solve(&system, &geometry.settings, &reference, &mut report)?;
+            irradiance = self.solve(&system, &geometry.settings, &reference, &mut solving, &mut report)?;
         }
+        let radiance = solving.radiance;
         policy::check_radiance(&radiance, bands)?;
         let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
         let sides = elements.facet_sides();
@@ -313,20 +336,21 @@ impl Host {
     /// Expected squared error of each unknown.
     fn accuracy(&self, system: &System<'_>, radiance: &[f64], reference: &[f64]) -> Result<Vec<f32>, Error> {
         let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
-        let mut differences = std::vec![0.0; unknowns * bands];
+        let mut differences = std::vec![[0.0; 2]; unknowns * bands];
         self.split(&mut differences, bands, |range, out| {
-            accuracy::differences(system, radiance, range, out)
+            accuracy::differences(system, radiance, reference, range, out)
         })?;
         let (mut carried, mut next) = (std::vec![0.0; unknowns * bands], std::vec![0.0; unknowns * bands]);
-        for _ in 0..accuracy::CARRIED {
+        for number in 0..accuracy::carried(system.scene) {
+            let from = if number > 0 { &carried[..] } else { &[] };
             self.split(&mut next, bands, |range, out| {
-                accuracy::carry(system, &differences, &carried, range, out)
+                accuracy::carry(system, &differences, from, range, out)
             })?;
             core::mem::swap(&mut carried, &mut next);
         }
         let mut variance = std::vec![0.0; unknowns];
         self.split(&mut variance, 1, |range, out| {
-            accuracy::rows(system, radiance, &carried, reference, range, out)
+            accuracy::rows(system, &differences, &carried, range, out)
         })?;
         Ok(variance)
     }
@@ -360,26 +384,26 @@ impl Host {
         Ok(beams.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
     }
 
-    /// Solves for the diffuse radiance; returns the irradiance table and the radiances.
+    /// Solves for the diffuse radiance, the second time from the solution before; returns the irradiance table.
     fn solve(
         &self,
         system: &System<'_>,
         settings: &Settings,
         reference: &[f64],
+        solving: &mut Solving,
         report: &mut Report,
-    ) -> Result<(Vec<f64>, Vec<f64>), Error> {
+    ) -> Result<Vec<f64>, Error> {
         let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
-        let mut radiance = std::vec![0.0; unknowns * bands];
-        self.start(system, &mut radiance)?;
         let mut irradiance = std::vec![0.0; unknowns * system.shape.stride()];
         if system.shape.levels == 1 {
-            report.certified.solver = self.converge(system, settings, reference, &mut radiance, report)?;
+            report.certified.solver = self.converge(system, settings, reference, solving, report)?;
             self.split(&mut irradiance, system.shape.stride(), |range, out| {
-                system.gather(range, 0, |_| &radiance, out)
+                system.gather(range, 0, |_| &solving.radiance, out)
             })?;
-            return Ok((irradiance, radiance));
+            return Ok(irradiance);
         }
-        let mut orders = std::vec![radiance];
+        let mut orders = std::vec![core::mem::take(&mut solving.radiance)];
+        orders.iter_mut().try_for_each(|first| self.start(system, first))?;
         for level in 0..system.shape.levels {
             self.split(&mut irradiance, system.shape.stride(), |range, out| {
                 system.gather(range, level, |order| &orders[order], out)
@@ -392,7 +416,8 @@ impl Host {
             orders.push(next);
             report.sweeps += 1;
         }
-        Ok((irradiance, orders.pop().unwrap_or_default()))
+        solving.radiance = orders.pop().unwrap_or_default();
+        Ok(irradiance)
     }
 
     /// The radiances before any reflection.
@@ -410,46 +435,60 @@ impl Host {
         system: &System<'_>,
         settings: &Settings,
         reference: &[f64],
-        radiance: &mut Vec<f64>,
+        solving: &mut Solving,
         report: &mut Report,
     ) -> Result<f64, Error> {
         let Settings { tolerance, max_bounces, .. } = *settings;
-        let mut probe = std::vec![0u8; system.elements.unknowns()];
-        let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
-        let q = parts.into_iter().fold(0.0, f64::max);
-        let mut next = std::vec![0.0; radiance.len()];
-        let kept = solver::kept(system.scene, tolerance, max_bounces);
-        let mut history = std::vec![0.0; kept * radiance.len()];
-        self.split(
-            history.head_mut(if kept > 0 { radiance.len() } else { 0 }),
-            system.shape.bands,
-            |range, out| {
-                system.deficits(range, out);
-                Ok(())
-            },
-        )?;
-        let mut inverse = None;
-        if Solver::is_closed(q, max_bounces) {
-            radiance.fill(0.0);
-            let mut unit = Solver::unit();
-            self.iterate(
-                &mut unit,
-                system,
-                [&mut *radiance, &mut next],
-                &mut history,
-                |range, from, to, relax| system.unit_sweep(range, from, to, relax),
-            )?;
-            report.sweeps += unit.done;
-            inverse = Some(unit.inverse(&next, q)?);
-            self.start(system, radiance)?;
+        let bounds = match solving.bounds {
+            Some(bounds) => bounds,
+            None => self.bounds(system, settings, solving, report)?,
+        };
+        // a sweep from a solution adds a reflection to all that it has
+        if solving.bounds.is_none() || max_bounces.is_some() {
+            self.start(system, &mut solving.radiance)?;
         }
-        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, kept > 0);
-        self.iterate(&mut solver, system, [radiance, &mut next], &mut history, |range, from, to, relax| {
+        solving.bounds = Some(bounds);
+        let Solving { radiance, next, history, .. } = solving;
+        let mut solver = Solver::new(bounds.0, bounds.1, tolerance, max_bounces, !history.is_empty());
+        self.iterate(&mut solver, system, [radiance, next], history, |range, from, to, relax| {
             system.relaxed_sweep(range, from, to, reference, relax)
         })?;
         solver.finish(radiance, reference, max_bounces);
         report.sweeps += solver.done;
         Ok(solver.error)
+    }
+
+    /// The contraction of a sweep and, where it needs one, the bound on the inverse; they hold for any light.
+    fn bounds(
+        &self,
+        system: &System<'_>,
+        settings: &Settings,
+        solving: &mut Solving,
+        report: &mut Report,
+    ) -> Result<(f64, Option<f64>), Error> {
+        let Settings { tolerance, max_bounces, .. } = *settings;
+        let size = solving.radiance.len();
+        let mut probe = std::vec![0u8; system.elements.unknowns()];
+        let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
+        let q = parts.into_iter().fold(0.0, f64::max);
+        solving.next = std::vec![0.0; size];
+        solving.history = std::vec![0.0; solver::kept(system.scene, tolerance, max_bounces) * size];
+        let deficits = size.min(solving.history.len());
+        self.split(solving.history.head_mut(deficits), system.shape.bands, |range, out| {
+            system.deficits(range, out);
+            Ok(())
+        })?;
+        if !Solver::is_closed(q, max_bounces) {
+            return Ok((q, None));
+        }
+        let Solving { radiance, next, history, .. } = solving;
+        radiance.fill(0.0);
+        let mut unit = Solver::unit();
+        self.iterate(&mut unit, system, [radiance, next], history, |range, from, to, relax| {
+            system.unit_sweep(range, from, to, relax)
+        })?;
+        report.sweeps += unit.done;
+        Ok((q, Some(unit.inverse(next, q)?)))
     }
 
     /// Iterates to the end: the latest solution stands in the first of both, the one before in the second.

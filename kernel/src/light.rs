@@ -3,7 +3,7 @@
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
 
-use crate::bvh::{Ahead, Bvh};
+use crate::bvh::Bvh;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::element::Elements;
 use crate::error::{Error, Field as InputField};
@@ -11,7 +11,9 @@ use crate::index::{Index, IndexMut, copy, pieces, span};
 use crate::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::mirror::Surface;
 use crate::qmc::{Sequence, hash2, triangle};
+use crate::ray::Ray;
 use crate::scene::{MAX_BANDS, Scene};
+use crate::simd::{self, Isa, LaneTask, Lanes};
 use crate::sky::Sky;
 use crate::sun::Sun;
 use core::ops::Range;
@@ -134,64 +136,90 @@ pub fn sky_rows(
     if !sky.is_uniform() && !coupling.is_directional() {
         return Err(Error::Mismatch { what: "coupling without directions" });
     }
-    let bands = shape.bands.clamp(1, MAX_BANDS);
-    let mut unobstructed = [0.0; MAX_BANDS];
-    let mut of = None;
-    for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
-        values.fill(0.0);
-        if row.row.state == ABSENT {
-            continue;
-        }
-        let (facet, side) = elements.facet_of(unknown);
-        if of != Some((facet, side)) {
-            sky.irradiance(scene.side_normal(facet, side), relative_error, unobstructed.head_mut(bands));
-            of = Some((facet, side));
-        }
-        for (level, part) in pieces(values, 3 * bands).enumerate() {
-            if row.row.state != ENCLOSED {
-                copy(part.head_mut(bands), &unobstructed);
-            }
-            add_escapes(&row, sky, shape, level, part);
-            part.head_mut(bands).iter_mut().for_each(|e| *e = e.max(0.0));
-        }
-    }
+    simd::run_lanes(
+        Isa::detect(),
+        SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out },
+    );
     Ok(())
 }
 
-/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors.
-fn add_escapes(row: &RowView<'_>, sky: &Sky<'_>, shape: Shape, level: usize, part: &mut [f64]) {
-    let bands = shape.bands.clamp(1, MAX_BANDS);
-    let mut radiance = [0.0; MAX_BANDS];
-    let radiance = radiance.head_mut(bands);
-    let uniform = sky.is_uniform();
-    if uniform {
-        sky.radiance(Vec3::Z, radiance);
+/// [`sky_rows`] at work.
+struct SkyRows<'a, 'o> {
+    scene: &'a Scene<'a>,
+    elements: &'a Elements<'a>,
+    coupling: &'a Coupling<'a>,
+    sky: &'a Sky<'a>,
+    relative_error: f64,
+    range: Range<usize>,
+    shape: Shape,
+    out: &'o mut [f64],
+}
+
+impl LaneTask for SkyRows<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out } = self;
+        let bands = shape.bands.clamp(1, MAX_BANDS);
+        let (mut unobstructed, mut sum) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
+        let (unobstructed, sum) = (unobstructed.head_mut(bands), sum.head_mut(bands));
+        let mut of = None;
+        for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
+            values.fill(0.0);
+            if row.row.state == ABSENT {
+                continue;
+            }
+            if row.row.state != ENCLOSED {
+                let own = elements.facet_of(unknown);
+                if of != Some(own) {
+                    sky.irradiance(scene.side_normal(own.0, own.1), relative_error, unobstructed);
+                    of = Some(own);
+                }
+                pieces(values, 3 * bands).for_each(|part| copy(part, unobstructed));
+            }
+            add_escapes(&row, sky, lanes, shape, sum, values);
+            let means = pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands));
+            means.for_each(|e| *e = e.max(0.0));
+        }
     }
-    let mut parts = pieces(part, bands);
-    let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else { return };
-    for record in row.escapes {
-        if !shape.counts(row.depth(record), level) {
-            continue;
+}
+
+/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors; `sum` has room for a value
+/// of each band.
+#[inline(always)]
+fn add_escapes<L: Lanes>(
+    row: &RowView<'_>,
+    sky: &Sky<'_>,
+    lanes: L,
+    shape: Shape,
+    sum: &mut [f64],
+    values: &mut [f64],
+) {
+    let bands = sum.len();
+    for bundle in row.escapes {
+        sky.sum(lanes, bundle.packed, sum);
+        match bundle.word {
+            BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
+            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= PI * product),
         }
-        if !uniform {
-            sky.radiance(record.direction(), radiance);
-        }
-        let blocked = record.word() == BLOCKED;
-        let products = row.products(record);
-        let g = record.gradient.map(f64::from);
-        let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut()));
-        for (band, ((mean, (first, second)), radiance)) in sums.zip(radiance.iter()).enumerate() {
-            let share = if blocked { -1.0 } else { products.at(band) };
-            let l = PI * share * radiance;
-            *mean += l * record.weight;
-            *first += l * g[0];
-            *second += l * g[1];
+        let depth = row.depth(bundle.word);
+        let [a, b] = bundle.gradient.map(f64::from);
+        for (_, part) in
+            pieces(values, 3 * bands).enumerate().filter(|(level, _)| shape.counts(depth, *level))
+        {
+            for (part, factor) in pieces(part, bands).zip([bundle.weight, a, b]) {
+                part.iter_mut().zip(&*sum).for_each(|(to, l)| *to += l * factor);
+            }
         }
     }
 }
 
 /// Points on an element at which the sun is tested: all of the first share agree, or all are taken.
 const SUN_POINTS: (u32, u32) = (16, 128);
+
+/// Rays toward the sun that are traced together.
+const SUN_BATCH: usize = 32;
 
 /// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
 /// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
@@ -208,6 +236,8 @@ pub fn sun_rows(
         return Err(Error::Length { what: "sun table", expected: span(&range), given: out.len() });
     }
     let mut rays = 0;
+    let mut toward = [Ray::new(Vec3::ZERO, Vec3::Z); SUN_BATCH];
+    let (mut shares, mut hidden) = ([0.0; SUN_BATCH], [false; SUN_BATCH]);
     for ((unknown, row), value) in coupling.rows(range).zip(out) {
         let (facet, side) = elements.facet_of(unknown);
         let normal = scene.side_normal(facet, side);
@@ -222,23 +252,28 @@ pub fn sun_rows(
         }
         let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
         let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
-        let mut ahead = Ahead::default();
-        let leave = |n| {
-            let (p, q) = sequence.pair(n, 0);
-            let (a, b) = triangle(p, q);
-            let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
-            let (s, t) = sequence.pair(n, 2);
-            Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t))
-        };
         while count < goal {
-            let ray = leave(count);
-            let share = sun.share(ray.direction, normal);
-            if share > 0.0 {
-                all += share;
-                let any = |n| if n == count { ray } else { leave(n) };
-                lit += if bvh.occluded_of(&mut ahead, count, goal, any) { 0.0 } else { share };
+            let batch = (goal - count).min(SUN_BATCH as u32);
+            let mut kept = 0;
+            for n in count..count + batch {
+                let (p, q) = sequence.pair(n, 0);
+                let (a, b) = triangle(p, q);
+                let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
+                let (s, t) = sequence.pair(n, 2);
+                let ray = Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t));
+                let share = sun.share(ray.direction, normal);
+                if share > 0.0 {
+                    toward.set(kept, ray);
+                    shares.set(kept, share);
+                    kept += 1;
+                }
             }
-            count += 1;
+            bvh.occluded_many(toward.head(kept), hidden.head_mut(kept));
+            for (share, hidden) in shares.head(kept).iter().zip(&hidden) {
+                all += share;
+                lit += if *hidden { 0.0 } else { *share };
+            }
+            count += batch;
             if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
                 goal = SUN_POINTS.1;
             }

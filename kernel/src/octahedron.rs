@@ -2,6 +2,9 @@
 
 use crate::math::{Vec3, fabs};
 
+/// Bits of each coordinate of a direction to the sky: error below 6.6e-5 rad, and about none on the mean of many.
+pub const SKY_BITS: u32 = 16;
+
 /// A unit vector in twice `BITS` bits (at most 31 each), to within 4.3 times 2^-BITS rad.
 pub fn pack<const BITS: u32>(d: Vec3) -> u64 {
     let sum = fabs(d.x) + fabs(d.y) + fabs(d.z);
@@ -25,8 +28,8 @@ pub fn unpack<const BITS: u32>(p: u64) -> Vec3 {
     Vec3::new(x, y, z).normalize()
 }
 
-/// An even number of steps, so that the axes are among them.
-fn steps(bits: u32) -> f64 {
+/// How many steps there are from one side of the square to the other: an even number, so that the axes are among them.
+pub fn steps(bits: u32) -> f64 {
     ((1u64 << bits) - 2) as f64
 }
 
@@ -55,7 +58,7 @@ mod tests {
 
     #[test]
     fn packed_directions_come_back() {
-        check::<23>();
+        check::<SKY_BITS>();
         check::<31>();
     }
 }

@@ -36,12 +36,11 @@ impl System<'_> {
     /// Largest of rho_d times a row's sum, over the rows of `range` and the bands: the contraction q of a sweep.
     pub fn contraction(&self, range: Range<usize>) -> f64 {
         let mut largest = 0.0;
+        let mut sums = [0.0; MAX_BANDS];
+        let sums = sums.head_mut(self.shape.bands);
         for (unknown, row) in self.coupling.rows(range) {
             let diffuse = self.scene.diffuse(self.material(unknown));
-            let mut sums = [0.0; MAX_BANDS];
-            for record in row.targets {
-                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
-            }
+            row.sums(sums);
             for (sum, rho) in sums.iter().zip(diffuse) {
                 largest = f64::max(largest, sum * rho);
             }
@@ -74,13 +73,14 @@ impl System<'_> {
     ) -> f64 {
         let bands = self.shape.bands.clamp(1, MAX_BANDS);
         let mut change: f64 = 0.0;
-        let rows = self.coupling.rows(range.clone());
-        for ((unknown, row), out) in rows.zip(pieces(to, bands)) {
+        let mut sums = [0.0; MAX_BANDS];
+        let sums = sums.head_mut(bands);
+        for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
             let material = self.material(unknown);
             let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
-            let bounced = bounced(&row, from, bands);
+            row.gather(from, sums);
             let direct = self.direct.part(self.shape.at(unknown, 0));
-            for (band, (out, bounced)) in out.iter_mut().zip(bounced).enumerate() {
+            for (band, (out, &bounced)) in out.iter_mut().zip(&*sums).enumerate() {
                 let mut irradiance = direct.at(band) + PI * bounced;
                 if let Some(sun) = &self.light.sun {
                     irradiance += self.sun.at(unknown) * sun.irradiance(band);
@@ -104,12 +104,9 @@ impl System<'_> {
     pub fn deficits(&self, range: Range<usize>, out: &mut [f64]) {
         let bands = self.shape.bands;
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
-            let mut sums = [0.0; MAX_BANDS];
-            for record in row.targets {
-                sums.iter_mut().zip(row.products(record)).for_each(|(s, p)| *s += record.weight * p);
-            }
+            row.sums(out);
             let diffuse = self.scene.diffuse(self.material(unknown));
-            out.iter_mut().zip(diffuse).zip(sums).for_each(|((out, rho), sum)| *out = 1.0 - rho * sum);
+            out.iter_mut().zip(diffuse).for_each(|(out, rho)| *out = 1.0 - rho * *out);
         }
     }
 
@@ -128,10 +125,12 @@ impl System<'_> {
     pub fn unit_sweep(&self, range: Range<usize>, from: &[f64], to: &mut [f64], relaxation: f64) -> f64 {
         let bands = self.shape.bands.clamp(1, MAX_BANDS);
         let mut increase: f64 = 0.0;
+        let mut sums = [0.0; MAX_BANDS];
+        let sums = sums.head_mut(bands);
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
             let diffuse = self.scene.diffuse(self.material(unknown));
-            let bounced = bounced(&row, from, bands);
-            for (band, (out, bounced)) in out.iter_mut().zip(bounced).enumerate() {
+            row.gather(from, sums);
+            for (band, (out, &bounced)) in out.iter_mut().zip(&*sums).enumerate() {
                 let new = 1.0 + diffuse.at(band) * bounced;
                 increase = increase.max(new - from.at(unknown * bands + band));
                 *out = relax(*out, new, relaxation);
@@ -159,6 +158,8 @@ impl System<'_> {
         let part = self.shape.at(0, level);
         let mut sky = [0.0; MAX_BANDS];
         self.light.largest_radiance(sky.head_mut(bands));
+        let mut squares = [0.0; MAX_BANDS];
+        let square = squares.head_mut(bands);
         for ((unknown, row), values) in self.coupling.rows(range).zip(pieces(out, stride)) {
             let values = values.part_mut(part.clone());
             copy(values, self.direct.part(self.shape.at(unknown, level)));
@@ -166,32 +167,60 @@ impl System<'_> {
             let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else {
                 continue;
             };
-            let blocked = row.blocked();
+            let blocked = row.row.blocked;
             let share = if blocked > 0.5 { 1.0 - blocked } else { blocked };
-            let mut square = sky.map(|l| (PI * l) * (PI * l) * share);
-            for record in row.targets {
-                let depth = row.depth(record);
-                if !self.shape.counts(depth, level) {
-                    continue;
-                }
-                let from = if self.shape.levels == 1 { 0 } else { level - depth as usize };
-                let start = record.unknown() * bands;
-                let seen = radiance(from).part(start..start.wrapping_add(bands));
-                let g = record.gradient.map(f64::from);
-                let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut square);
-                let terms = row.products(record).iter().zip(seen);
-                for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
-                    let l = PI * product * seen;
+            square.iter_mut().zip(&sky).for_each(|(square, l)| *square = (PI * l) * (PI * l) * share);
+            if let ([mean], [first], [second], [square]) =
+                (&mut *mean, &mut *first, &mut *second, &mut *square)
+                && self.shape.levels == 1
+            {
+                let seen = radiance(0);
+                for record in row.targets {
+                    let product = row.products(record.word()).at(0);
+                    let l = PI * product * seen.at(record.unknown());
                     *mean += l * record.weight;
-                    *first += l * g[0];
-                    *second += l * g[1];
+                    *first += l * f64::from(record.gradient[0]);
+                    *second += l * f64::from(record.gradient[1]);
                     *square += l * l * record.weight;
                 }
+            } else {
+                let sums = [&mut *mean, &mut *first, &mut *second, &mut *square];
+                self.add_targets(&row, level, &radiance, sums);
             }
             mean.iter_mut().for_each(|mean| *mean = mean.max(0.0));
-            damp(first, second, &square, row.row.rays);
+            damp(first, second, square, row.row.rays);
         }
         Ok(())
+    }
+
+    /// Adds to mean, gradients and mean square of a row's irradiance what its targets send.
+    fn add_targets<'x>(
+        &self,
+        row: &RowView<'_>,
+        level: usize,
+        radiance: &impl Fn(usize) -> &'x [f64],
+        [mean, first, second, square]: [&mut [f64]; 4],
+    ) {
+        let bands = self.shape.bands;
+        for record in row.targets {
+            let depth = row.depth(record.word());
+            if !self.shape.counts(depth, level) {
+                continue;
+            }
+            let from = if self.shape.levels == 1 { 0 } else { level - depth as usize };
+            let start = record.unknown() * bands;
+            let seen = radiance(from).part(start..start.wrapping_add(bands));
+            let g = record.gradient.map(f64::from);
+            let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut *square);
+            let terms = row.products(record.word()).iter().zip(seen);
+            for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
+                let l = PI * product * seen;
+                *mean += l * record.weight;
+                *first += l * g[0];
+                *second += l * g[1];
+                *square += l * l * record.weight;
+            }
+        }
     }
 
     /// What the rows of `range` miss where they take an element's radiance for the same all over it: irradiance by the
@@ -204,7 +233,7 @@ impl System<'_> {
                 let seen = irradiance.part(self.shape.at(record.unknown(), 0));
                 let diffuse = self.scene.diffuse(self.material(record.unknown()));
                 let (first, second) = (seen.part(bands..2 * bands), seen.part(2 * bands..3 * bands));
-                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record));
+                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record.word()));
                 for (out, (((a, b), rho), product)) in out.iter_mut().zip(slopes) {
                     let [at, bt] = record.moment.map(f64::from);
                     *out += product * rho * (a * at + b * bt);
@@ -257,19 +286,6 @@ impl System<'_> {
 /// Steps of so small a share of a radiance are rounding, which no sweep undoes: a few roundings of each of a row's
 /// records, which come to sqrt(n).
 pub const ROUNDING: f64 = 16.0 * f64::EPSILON;
-
-/// Sum of a row's shares times the radiances that they bring.
-#[inline(always)]
-fn bounced(row: &RowView<'_>, from: &[f64], bands: usize) -> [f64; MAX_BANDS] {
-    let mut bounced = [0.0; MAX_BANDS];
-    for record in row.targets {
-        let first = record.unknown() * bands;
-        let seen = from.part(first..first.wrapping_add(bands));
-        let terms = seen.iter().zip(row.products(record));
-        bounced.iter_mut().zip(terms).for_each(|(b, (x, p))| *b += record.weight * p * x);
-    }
-    bounced
-}
 
 /// `new` itself where the relaxation is 1.
 #[inline(always)]

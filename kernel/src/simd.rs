@@ -85,6 +85,12 @@ pub trait Lanes: Copy {
     fn same8(self, a: &[u32; 8], x: u32) -> u32;
     fn none8(self) -> Self::M8;
     fn marks8(self, marks: Self::M8) -> [u32; 8];
+    fn add8(self, a: Self::F8, b: Self::F8) -> Self::F8;
+    fn div8(self, a: Self::F8, b: Self::F8) -> Self::F8;
+    /// Square roots, correctly rounded.
+    fn root8(self, x: Self::F8) -> Self::F8;
+    /// The upper and the lower 16 bits of each, as numbers.
+    fn halves8(self, x: &[u32; 8]) -> (Self::F8, Self::F8);
 }
 
 /// A computation in explicit lanes; `run` must be `#[inline(always)]`.
@@ -134,7 +140,9 @@ impl Lanes for Arrays {
     type M8 = [u32; 8];
     arrays! {
         sub8(a, b) = *a - b;
+        add8(a, b) = *a + b;
         mul8(a, b) = *a * b;
+        div8(a, b) = *a / b;
         min8(a, b) = if *a < b { *a } else { b };
         max8(a, b) = if *a > b { *a } else { b };
     }
@@ -192,6 +200,15 @@ impl Lanes for Arrays {
     fn marks8(self, marks: [u32; 8]) -> [u32; 8] {
         marks
     }
+    #[inline(always)]
+    fn root8(self, x: [f32; 8]) -> [f32; 8] {
+        // twice rounded, and right: a root of 24 bits is never that close to the middle of two
+        x.map(|x| crate::math::sqrt(f64::from(x)) as f32)
+    }
+    #[inline(always)]
+    fn halves8(self, x: &[u32; 8]) -> ([f32; 8], [f32; 8]) {
+        (x.map(|x| f32::from((x >> 16) as u16)), x.map(|x| f32::from(x as u16)))
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -224,6 +241,7 @@ mod avx2 {
         type F8 = __m256;
         type M8 = __m256;
         avx2!(sub8 = _mm256_sub_ps, mul8 = _mm256_mul_ps, min8 = _mm256_min_ps, max8 = _mm256_max_ps);
+        avx2!(add8 = _mm256_add_ps, div8 = _mm256_div_ps);
         #[inline(always)]
         fn splat8(self, x: f32) -> __m256 {
             // SAFETY: `self` proves AVX2.
@@ -281,6 +299,20 @@ mod avx2 {
         #[inline(always)]
         fn marks8(self, marks: __m256) -> [u32; 8] {
             self.store8(marks).map(f32::to_bits)
+        }
+        #[inline(always)]
+        fn root8(self, x: __m256) -> __m256 {
+            // SAFETY: `self` proves AVX2.
+            unsafe { _mm256_sqrt_ps(x) }
+        }
+        #[inline(always)]
+        fn halves8(self, x: &[u32; 8]) -> (__m256, __m256) {
+            // SAFETY: `self` proves AVX2; the array has as many bytes as the register, and no alignment is asked.
+            unsafe {
+                let x = _mm256_loadu_si256(x.as_ptr().cast());
+                let low = _mm256_and_si256(x, _mm256_set1_epi32(0xffff));
+                (_mm256_cvtepi32_ps(_mm256_srli_epi32::<16>(x)), _mm256_cvtepi32_ps(low))
+            }
         }
     }
 }

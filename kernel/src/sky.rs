@@ -4,6 +4,7 @@
 //! ISO 15469 (`cie`) and sampled skies (`table`) are integrated numerically.
 
 mod cie;
+mod sum;
 mod table;
 
 use crate::error::{Error, Field};

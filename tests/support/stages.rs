@@ -228,7 +228,7 @@ pub fn run(
     let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
     for (_, row) in coupling.rows(0..counts.unknowns) {
         counts.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
-        counts.records += row.targets.len() + row.escapes.len();
+        counts.records += row.targets.len() + row.escapes.map(|b| b.packed.len()).sum::<usize>();
     }
 
     let light = Light {
@@ -311,6 +311,11 @@ impl Stage<'_> {
         let (rows, stride) = (unknowns * bands, self.shape.stride());
         let Tables { direct, sun, radiance, next, irradiance, slots, thrown, images, .. } = tables;
         let (direct, irradiance) = (&mut direct[..unknowns * stride], &mut irradiance[..unknowns * stride]);
+        let system = self.system(direct, &sun[..unknowns]);
+        split(parts, unknowns, bands, &mut radiance[..rows], |range, out| {
+            system.start(range, out);
+            Ok(())
+        })?;
         self.sweeps(
             direct,
             &sun[..unknowns],
@@ -351,7 +356,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Sweeps to the end, and gathers; the radiances stand in the first of both tables then.
+    /// Sweeps to the end from what the first of both tables holds, and gathers; the radiances stand there then.
     fn sweeps(
         &self,
         direct: &[f64],
@@ -362,10 +367,6 @@ impl Stage<'_> {
     ) -> Result<(), Error> {
         let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
         let system = self.system(direct, sun);
-        split(parts, unknowns, bands, from, |range, out| {
-            system.start(range, out);
-            Ok(())
-        })?;
         let q = system.contraction(0..unknowns);
         let goal = 1e-3 * self.plan.tolerance;
         let most = sweeps(q, goal) + 200;

@@ -1,5 +1,6 @@
 //! Couplings in baked blocks.
 
+use super::bundle::Bundles;
 use super::word::{EMPTY, LONGEST, Word};
 use super::{ABSENT, BLOCKED, Block, ENCLOSED, Head, Record, Row};
 use crate::arena::View;
@@ -83,18 +84,27 @@ impl<'m> Block<'m> {
 
     fn row_sound(&self, row: &Row, end: u32, unknowns: usize) -> bool {
         let targets = self.records.part(row.start as usize..row.escapes as usize);
-        let escapes = self.records.part(row.escapes as usize..end as usize);
-        let known = |r: &Record| (r.word() as usize) < self.words.len();
-        let weighed = |r: &Record| {
-            // closed chains count twice at most; gradients of a share of the hemisphere: 36 times it at most
-            (0.0..=2.0 + 1e-6).contains(&r.weight)
-                && r.gradient.iter().chain(&r.checks).chain(&r.moment).all(|g| g.abs() <= 100.0)
-        };
+        let escapes = Bundles::new(self.records.part(row.escapes as usize..end as usize));
+        let known = |word: u16| (word as usize) < self.words.len();
+        // closed chains count twice at most; gradients of a share of the hemisphere: 36 times it at most
+        let share = |weight: f64| (0.0..=2.0 + 1e-6).contains(&weight);
+        let bounded = |values: &[f32]| values.iter().all(|g| g.abs() <= 100.0);
+        let weighed =
+            |r: &Record| share(r.weight) && [&r.gradient[..], &r.checks, &r.moment].into_iter().all(bounded);
         (ABSENT..=ENCLOSED).contains(&row.state)
             && (0.0..=1.0).contains(&row.exposed)
             && row.lost >= 0.0
             && row.lost.is_finite()
-            && targets.iter().all(|r| !r.is_escape() && r.unknown() < unknowns && known(r) && weighed(r))
-            && escapes.iter().all(|r| r.is_escape() && (known(r) || r.word() == BLOCKED) && weighed(r))
+            && (-1e-6..=2.0 + 1e-6).contains(&row.blocked)
+            && targets
+                .iter()
+                .all(|r| !r.is_escape() && r.unknown() < unknowns && known(r.word()) && weighed(r))
+            && escapes.rest().iter().all(|word| *word == 0)
+            && escapes.into_iter().all(|b| {
+                (known(b.word) || b.word == BLOCKED)
+                    && share(b.total())
+                    && bounded(&b.gradient)
+                    && bounded(&b.checks)
+            })
     }
 }

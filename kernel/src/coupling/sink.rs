@@ -1,7 +1,7 @@
 //! Writes rows of records into a block of caller memory.
 
-use super::word::{Word, Words};
-use super::{BLOCKED, Head, Record, Row};
+use super::word::{EMPTY, Word, Words};
+use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -157,10 +157,17 @@ impl<'m> Sink<'m> {
         let words = &self.words;
         sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
         let kept = merge(row, join);
-        let escapes = self.start + row.head(kept).partition_point(|r| !r.is_escape());
-        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..stats });
+        let row = row.head_mut(kept);
+        let targets = row.partition_point(|r| !r.is_escape());
+        let escapes = self.start + targets;
+        let enclosed = stats.state == ENCLOSED;
+        let word = if enclosed { EMPTY } else { BLOCKED };
+        let own = row.part(targets..kept).iter().filter(|r| r.word() == word).map(|r| r.weight).sum::<f64>();
+        let blocked = if enclosed { 1.0 - own } else { own };
+        let packed = bundle::pack(row.part_mut(targets..kept));
+        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, blocked, ..stats });
         self.done += 1;
-        self.start += kept;
+        self.start = escapes + packed;
         self.used = self.start;
     }
 
@@ -189,13 +196,16 @@ fn merge(row: &mut [Record], join: impl Fn(&mut Record, &Record) -> bool) -> usi
     kept
 }
 
-/// The order of a row: by target, then by word, whatever the words' numbers in this block.
+/// The order of a row: targets by what they are, then by word; behind them escapes by word, then as bundles need it;
+/// whatever the words' numbers in this block.
 fn order(words: &Words<'_>, a: &Record, b: &Record) -> Ordering {
-    match (a.key >> 16).cmp(&(b.key >> 16)) {
-        Ordering::Equal if a.word() == b.word() => Ordering::Equal,
-        Ordering::Equal if a.word() == BLOCKED => Ordering::Greater,
-        Ordering::Equal if b.word() == BLOCKED => Ordering::Less,
-        Ordering::Equal => words.compare(a.word(), b.word()),
-        other => other,
-    }
+    let escape = a.is_escape();
+    let by_word = || match (a.word(), b.word()) {
+        (a, b) if a == b => Ordering::Equal,
+        (BLOCKED, _) => Ordering::Greater,
+        (_, BLOCKED) => Ordering::Less,
+        (a, b) => words.compare(a, b),
+    };
+    let first = if escape && b.is_escape() { Ordering::Equal } else { (a.key >> 16).cmp(&(b.key >> 16)) };
+    first.then_with(by_word).then_with(|| if escape { bundle::order(a, b) } else { Ordering::Equal })
 }
