@@ -19,9 +19,12 @@ mod angle;
 mod batch;
 mod contour;
 mod convex;
+mod cubature;
 mod pair;
 mod patch;
 mod point;
+mod polygons;
+mod product;
 mod rule;
 mod visible;
 
@@ -29,4 +32,5 @@ pub use batch::{LANES, TriangleBlock, point_to_triangles};
 pub use convex::Convex;
 pub use pair::{exchange_area, polygon_to_polygon};
 pub use point::{point_to_polygon, point_to_triangle};
+pub use polygons::Polygons;
 pub use visible::{Estimate, visible_point_to_polygon, visible_polygon_to_polygon};

@@ -1,6 +1,7 @@
 //! The angle of a vector in the upper half plane, as straight-line code that vectorises.
 
 use crate::math::{FRAC_PI_2, PI};
+use crate::simd::{Lanes64, Wide};
 
 /// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
 const LOW: f64 = 0.414_213_562_373_095_05;
@@ -37,6 +38,26 @@ pub(super) fn angle(y: f64, x: f64) -> f64 {
     let z2 = z * z;
     let acute = turn + z * arc_tangent_series(z2);
     select(x < 0.0, PI - acute, acute)
+}
+
+/// [`angle`] in explicit lanes.
+#[inline(always)]
+pub(super) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
+    let (zero, least) = (lanes.all(0.0), lanes.all(f64::MIN_POSITIVE));
+    let wide = x.abs();
+    let (steep, slanted) = (y.gt(lanes.all(HIGH) * wide), y.gt(lanes.all(LOW) * wide));
+    let above = (zero - wide).where_else(steep, (y - wide).where_else(slanted, y));
+    let below = y.where_else(steep, (y + wide).where_else(slanted, wide));
+    let turn = lanes.all(FRAC_PI_2).where_else(steep, lanes.all(0.5 * FRAC_PI_2).where_else(slanted, zero));
+    let z = above / below.max(least);
+    let z2 = z * z;
+    let (z4, c) = (z2 * z2, ATAN);
+    let z8 = z4 * z4;
+    let low = (lanes.all(c[0]) + lanes.all(c[1]) * z2) + (lanes.all(c[2]) + lanes.all(c[3]) * z2) * z4;
+    let mid = (lanes.all(c[4]) + lanes.all(c[5]) * z2) + (lanes.all(c[6]) + lanes.all(c[7]) * z2) * z4;
+    let high = (lanes.all(c[8]) + lanes.all(c[9]) * z2) + lanes.all(c[10]) * z4;
+    let acute = turn + z * (low + (mid + high * z8) * z8);
+    (lanes.all(PI) - acute).where_else(zero.gt(x), acute)
 }
 
 /// atan(z)/z, by Estrin's scheme: half as many operations wait for one another as in Horner's.

@@ -4,6 +4,7 @@ use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
 use super::patch::{Patch, patches};
 use crate::math::{FRAC_1_PI, Vec3, sqrt, unit};
+use crate::simd::Isa;
 use core::cmp::Ordering;
 
 /// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.
@@ -37,6 +38,11 @@ pub fn polygon_to_polygon(a: &[Vec3], b: &[Vec3]) -> f64 {
 /// within 3e-9.) Where polygons of very unlike extent touch, rounding adds 1e-16 L_a L_b / (A_a F_ab) for
 /// perimeters L.
 pub fn exchange_area(a: &[Vec3], b: &[Vec3]) -> f64 {
+    exchange_area_with(Isa::BASELINE, a, b)
+}
+
+/// [`exchange_area`] on an instruction set, with the same bits.
+pub(super) fn exchange_area_with(isa: Isa, a: &[Vec3], b: &[Vec3]) -> f64 {
     let limit = 0.5 * length(double_area(a)).min(length(double_area(b)));
     let (first, second) = if in_order(a, b) { (a, b) } else { (b, a) };
     let Some(origin) = first.first() else {
@@ -51,7 +57,7 @@ pub fn exchange_area(a: &[Vec3], b: &[Vec3]) -> f64 {
     let mut sum = 0.0;
     for p in pieces(first).map(local) {
         for q in pieces(second).map(local) {
-            sum += exchange(&p, &q);
+            sum += exchange(isa, &p, &q);
         }
     }
     let value = sum * scale * scale;
@@ -70,7 +76,7 @@ fn in_order(a: &[Vec3], b: &[Vec3]) -> bool {
 }
 
 /// The power of two in (x/2, x]; none where x is zero, subnormal, not finite or its square overflows.
-fn power_of_two_below(x: f64) -> Option<f64> {
+pub(super) fn power_of_two_below(x: f64) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff << 52;
     (x > 1e-150 && x < 1e150).then(|| f64::from_bits(x.to_bits() & EXPONENT))
 }
@@ -87,7 +93,7 @@ pub(super) fn fronts(a: &Convex, b: &Convex) -> Option<(Convex, Convex)> {
 }
 
 /// Exchange area of two pieces whose extent is about 1.
-fn exchange(a: &Convex, b: &Convex) -> f64 {
+fn exchange(isa: Isa, a: &Convex, b: &Convex) -> f64 {
     let (Some(na), Some(nb)) = (unit(double_area(a.corners())), unit(double_area(b.corners()))) else {
         return 0.0;
     };
@@ -97,7 +103,7 @@ fn exchange(a: &Convex, b: &Convex) -> f64 {
     if let Some(sum) = by_area(&front_a, na, &front_b, nb, 0) {
         return sum;
     }
-    let sum = contour::integral(&front_a, &front_b).max(0.0) * (0.5 * FRAC_1_PI);
+    let sum = contour::integral(isa, &front_a, &front_b).max(0.0) * (0.5 * FRAC_1_PI);
     if sum * CANCELLATION < perimeter(&front_a) * perimeter(&front_b) {
         return by_area(&front_a, na, &front_b, nb, BUDGET).unwrap_or(sum);
     }
