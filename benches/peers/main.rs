@@ -162,6 +162,20 @@ fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     }))
 }
 
+/// Copies what is above a square matrix's diagonal below it, in tiles that the cache holds.
+fn mirror(matrix: &mut [f64], size: usize) {
+    const TILE: usize = 32;
+    for top in (0..size).step_by(TILE) {
+        for left in (0..=top).step_by(TILE) {
+            for i in top..(top + TILE).min(size) {
+                for j in left..(left + TILE).min(i) {
+                    matrix[i * size + j] = matrix[j * size + i];
+                }
+            }
+        }
+    }
+}
+
 /// Form factors of all pairs of a corner's quads on one thread; the worst row against the same quad's factors to the
 /// whole walls.
 fn factors(quads: usize, runs: usize) -> Answer {
@@ -176,20 +190,16 @@ fn factors(quads: usize, runs: usize) -> Answer {
     let mut sums = vec![0.0; count];
     let before = processor_seconds();
     let seconds = median(runs, || {
-        // all areas are the same, 1/n^2: exchange areas over them are factors
         let mut memory = vec![0; Polygons::bytes(&quads)?];
         let polygons = Polygons::new(Isa::detect(), &quads, &mut memory)?;
         let mut factors = vec![0.0; count * count];
         for (i, row) in factors.chunks_exact_mut(count).enumerate() {
-            polygons.exchange_areas(i, i + 1..count, &mut row[i + 1..])?;
+            let row = &mut row[i + 1..];
+            polygons.exchange_areas(i, i + 1..count, row)?;
+            // all areas are the same, 1/n^2
+            row.iter_mut().for_each(|area| *area *= wall as f64);
         }
-        for i in 0..count {
-            for j in i + 1..count {
-                let factor = factors[i * count + j] * wall as f64;
-                factors[i * count + j] = factor;
-                factors[j * count + i] = factor;
-            }
-        }
+        mirror(&mut factors, count);
         for (sum, row) in sums.iter_mut().zip(factors.chunks_exact(count)) {
             *sum = row.iter().sum();
         }

@@ -40,6 +40,20 @@ impl Isa {
         }
         Isa::BASELINE
     }
+
+    /// Those that this processor has.
+    #[cfg(test)]
+    pub(crate) fn all() -> impl Iterator<Item = Isa> {
+        #[cfg(target_arch = "x86_64")]
+        let all = match Isa::detect().0 {
+            Level::Baseline => &[Level::Baseline][..],
+            Level::Avx2 => &[Level::Baseline, Level::Avx2],
+            Level::Avx512 => &[Level::Baseline, Level::Avx2, Level::Avx512],
+        };
+        #[cfg(not(target_arch = "x86_64"))]
+        let all = [Level::Baseline];
+        all.iter().map(|level| Isa(*level))
+    }
 }
 
 /// A computation to be compiled for each instruction set; `run` must be `#[inline(always)]`.

@@ -83,6 +83,35 @@ fn select(condition: bool, yes: f64, no: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::math::{atan2, cos, sin};
+    use crate::simd::{Isa, WIDTH, WideTask, run_wide};
+
+    struct Angles([f64; WIDTH], [f64; WIDTH]);
+
+    impl WideTask for Angles {
+        type Out = [f64; WIDTH];
+
+        #[inline(always)]
+        fn run<L: Lanes64>(self, lanes: L) -> [f64; WIDTH] {
+            wide_angle(lanes, lanes.of(&self.0), lanes.of(&self.1)).array()
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_one() {
+        for k in 0..1000 {
+            let at = |n: usize| PI * (k * WIDTH + n) as f64 / 7999.0;
+            let y: [f64; WIDTH] = core::array::from_fn(|n| sin(at(n)).max(0.0));
+            let x: [f64; WIDTH] = core::array::from_fn(|n| cos(at(n)));
+            let want: [f64; WIDTH] = core::array::from_fn(|n| angle(y[n], x[n]));
+            for isa in Isa::all() {
+                assert_eq!(run_wide(isa, Angles(y, x)), want);
+            }
+        }
+        let (y, x) =
+            ([0.0, 0.0, 0.0, 1.0, 1e-300, 0.0, 1.0, 1.0], [0.0, 1.0, -1.0, 0.0, 1.0, -0.0, 1.0, -1.0]);
+        let want: [f64; WIDTH] = core::array::from_fn(|n| angle(y[n], x[n]));
+        assert_eq!(run_wide(Isa::BASELINE, Angles(y, x)), want);
+    }
 
     /// 1e-15: the polynomial's 3e-17 and five roundings of numbers up to pi.
     #[test]

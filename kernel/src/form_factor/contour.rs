@@ -240,3 +240,37 @@ fn cut(from: f64, to: f64, z: Singular) -> f64 {
     };
     from + width * share
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::log;
+
+    struct Logs([f64; WIDTH]);
+
+    impl WideTask for Logs {
+        type Out = [f64; WIDTH];
+
+        #[inline(always)]
+        fn run<L: Lanes64>(self, lanes: L) -> [f64; WIDTH] {
+            half_log(lanes, lanes.of(&self.0)).array()
+        }
+    }
+
+    /// 2e-16 (1 + |ln x|): the series' 1e-17, and the roundings of numbers of at most that size.
+    #[test]
+    fn logarithms() {
+        for k in -4000i32..4000 {
+            let x: [f64; WIDTH] = core::array::from_fn(|n| {
+                libm::exp2(0.2 * f64::from(k) + 0.025 * n as f64).max(f64::MIN_POSITIVE * 2.0)
+            });
+            for isa in Isa::all() {
+                for (got, x) in run_wide(isa, Logs(x)).into_iter().zip(x) {
+                    let want = 0.5 * log(x);
+                    assert!((got - want).abs() <= 2e-16 * (1.0 + want.abs()), "ln {x:e}: {got:e} {want:e}");
+                }
+            }
+        }
+        assert_eq!(run_wide(Isa::BASELINE, Logs([0.0; WIDTH])), [0.0; WIDTH]);
+    }
+}

@@ -1,44 +1,37 @@
 //! Cubature rules on a square and on a triangle, with fewer points than products of Gauss rules of the same degree.
 //!
-//! Found by Newton's method on the moment equations of rules that a turn by a quarter (a third) maps onto themselves,
-//! to 40 digits; all points lie inside and all weights are positive.
+//! Where no source is named, found by Newton's method on the moment equations of rules that a turn by a quarter (a third)
+//! maps onto themselves, to 40 digits. All points lie inside and all weights are positive.
 
 /// Points [s, t, weight]: at corner + s u + t v of a parallelogram or triangle with the sides u and v; the weights' sum
 /// is 1.
 pub(super) type Points = &'static [[f64; 3]];
 
-/// Rules from the smallest on: exact for polynomials of degree 3, 5, 7, 9 and 11.
+/// Rules from the smallest on: exact for polynomials of degree 5, 7, 9, 11 and 13.
 pub(super) static SQUARE: [Points; RULES] = [
-    &SQUARE_3,
     &SQUARE_5,
     &turned::<3, 12>(4, None, &SQUARE_7),
     &turned::<4, 17>(4, Some([0.5, 0.5, 0.131687242798353909]), &SQUARE_9),
     &turned::<6, 24>(4, None, &SQUARE_11),
+    &turned::<8, 33>(4, Some([0.5, 0.5, 0.000385828718972626395]), &SQUARE_13),
 ];
 
-/// The same on a triangle; the first of degree 4.
+/// The same on a triangle.
 pub(super) static TRIANGLE: [Points; RULES] = [
-    &turned::<2, 6>(3, None, &TRIANGLE_4),
     &turned::<2, 7>(3, Some([THIRD, THIRD, 0.225]), &TRIANGLE_5),
     &turned::<4, 12>(3, None, &TRIANGLE_7),
     &turned::<6, 19>(3, Some([THIRD, THIRD, 0.0971357962827988338]), &TRIANGLE_9),
     &turned::<9, 27>(3, None, &TRIANGLE_11),
+    &turned::<12, 37>(3, Some([THIRD, THIRD, 0.0525209234008017994]), &TRIANGLE_13),
 ];
 
 /// Number of rules.
 pub(super) const RULES: usize = 5;
 
 /// Points of the largest.
-pub(super) const LARGEST: usize = 27;
+pub(super) const LARGEST: usize = 37;
 
 const THIRD: f64 = 1.0 / 3.0;
-
-/// The product of two Gauss rules of two points.
-const SQUARE_3: [[f64; 3]; 4] = {
-    const LOW: f64 = 0.211_324_865_405_187_118;
-    const HIGH: f64 = 0.788_675_134_594_812_882;
-    [[LOW, LOW, 0.25], [HIGH, LOW, 0.25], [HIGH, HIGH, 0.25], [LOW, HIGH, 0.25]]
-};
 
 /// J. Radon, "Zur mechanischen Kubatur", Monatshefte fuer Mathematik 52, 1948.
 const SQUARE_5: [[f64; 3]; 7] = {
@@ -77,9 +70,15 @@ const SQUARE_11: [[f64; 3]; 6] = [
     [0.287576375575665375, 0.479170964043988816, 0.0877896795995613594],
 ];
 
-const TRIANGLE_4: [[f64; 3]; 2] = [
-    [0.816938333177483064, 0.0944636257811708506, 0.109832604271510956],
-    [0.439288973607313173, 0.452585534958805947, 0.223500729061822378],
+const SQUARE_13: [[f64; 3]; 8] = [
+    [0.980158523877615367, 0.795268836932706629, 0.014429995815020043],
+    [0.0180466012181636345, 0.980765632493001441, 0.00375856855934020977],
+    [0.0419601055443690452, 0.474816459151807865, 0.0292708637225567255],
+    [0.0107089715250961116, 0.751094679443903243, 0.0114761078246505277],
+    [0.502820090543091956, 0.311388594913178873, 0.0689950358365908275],
+    [0.2990329961947863, 0.839967751065716204, 0.0499964332092374547],
+    [0.673278833565548075, 0.857323419303537395, 0.0486845126838102047],
+    [0.896145401372767794, 0.920758350574693388, 0.0232920251690508505],
 ];
 
 const TRIANGLE_5: [[f64; 3]; 2] = [
@@ -113,6 +112,23 @@ const TRIANGLE_11: [[f64; 3]; 9] = [
     [0.934516191785131913, 0.0339657385866687844, 0.0137738029120803022],
     [0.533418018046772229, 0.115543203707378831, 0.0507740854433591938],
     [0.125357561705368425, 0.557780949880033061, 0.0570937697749688265],
+];
+
+/// D. A. Dunavant, "High degree efficient symmetrical Gaussian quadrature rules for the triangle", Int. J. Numer. Meth.
+/// Eng. 21, 1985, to more digits.
+const TRIANGLE_13: [[f64; 3]; 12] = [
+    [0.495048184939704651, 0.495048184939704652, 0.0112801452093295422],
+    [0.468716635109573881, 0.468716635109573881, 0.0314235183624543697],
+    [0.414521336801276583, 0.414521336801276582, 0.0470725025041942708],
+    [0.229399572042831357, 0.229399572042831357, 0.0473635865363544608],
+    [0.114424495196330055, 0.114424495196330055, 0.0311675290457938146],
+    [0.0248113913634589747, 0.0248113913634589746, 0.00797577146507436882],
+    [0.268794997058760904, 0.636351174561660279, 0.0368484027287322473],
+    [0.63635117456166028, 0.268794997058760903, 0.0368484027287322474],
+    [0.291730066734287762, 0.690169159986905241, 0.0174014633038221204],
+    [0.690169159986905241, 0.291730066734287762, 0.0174014633038221204],
+    [0.126357385491668739, 0.851409537834241173, 0.0155217868390449188],
+    [0.851409537834241173, 0.126357385491668739, 0.0155217868390449189],
 ];
 
 /// All points of a rule: its centre, where it has one, and one point of each orbit turned `order` times: by quarters on
@@ -161,10 +177,10 @@ mod tests {
                 }
             }
         };
-        for (points, degree) in SQUARE.into_iter().zip([3, 5, 7, 9, 11]) {
+        for (points, degree) in SQUARE.into_iter().zip([5, 7, 9, 11, 13]) {
             check(points, degree, &|p, q| 1.0 / (f64::from(p + 1) * f64::from(q + 1)));
         }
-        for (points, degree) in TRIANGLE.into_iter().zip([4, 5, 7, 9, 11]) {
+        for (points, degree) in TRIANGLE.into_iter().zip([5, 7, 9, 11, 13]) {
             check(points, degree, &|p, q| 2.0 * factorial(p) * factorial(q) / factorial(p + q + 2));
         }
         let inside = |p: &[f64; 3]| p.iter().all(|x| *x > 0.0 && *x < 1.0);

@@ -13,7 +13,7 @@ use core::ops::Range;
 
 /// Least distance between a patch's centre and the sphere about the other patch, in units of the own radius, for which
 /// each rule of [`super::cubature`] is exact enough.
-const LEAST: [f64; RULES] = [3000.0, 120.0, 24.0, 10.0, 6.0];
+const LEAST: [f64; RULES] = [100.0, 23.5, 10.3, 6.2, 4.4];
 
 /// Convex planar polygons made ready for the exchange areas of many pairs of them.
 ///

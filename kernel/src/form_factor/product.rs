@@ -338,7 +338,7 @@ pub(super) struct Classes<'a> {
 }
 
 /// How much larger than a triangle of the same radius a parallelogram counts, to be integrated as exactly.
-const PARALLELOGRAM: f64 = 1.15;
+const PARALLELOGRAM: f64 = 1.16;
 
 /// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.
 const ON_PLANE: f64 = 1e-15;

@@ -374,3 +374,52 @@ pub(super) mod avx512 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::{Isa, run_wide};
+
+    /// Everything that lanes can do, of two arrays.
+    struct All([f64; WIDTH], [f64; WIDTH]);
+
+    impl WideTask for All {
+        type Out = ([[u64; WIDTH]; 10], u32);
+
+        #[inline(always)]
+        fn run<L: Lanes64>(self, lanes: L) -> Self::Out {
+            let (a, b) = (lanes.of(&self.0), lanes.of(&self.1));
+            let size = b.abs() + lanes.all(1e-300);
+            let values = [
+                a + b,
+                a - b,
+                a * b,
+                a / b,
+                size.sqrt(),
+                a.abs(),
+                a.max(b),
+                a.where_else(a.gt(b), b),
+                size.fraction(),
+                size.exponent(),
+            ];
+            let mut bits = [[0; WIDTH]; 10];
+            for (bits, value) in bits.iter_mut().zip(values) {
+                *bits = value.array().map(f64::to_bits);
+            }
+            (bits, L::F::bits(a.gt(b)))
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let a = [1.5, -2.25, 3e-310, 0.0, -0.0, 7.0, 1e300, 0.1];
+        let b = [0.3, 1e-200, 4.0, 5.0, 2.0, 7.0, -1e300, f64::INFINITY];
+        let want = run_wide(Isa::BASELINE, All(a, b));
+        assert_eq!(want.1, 0b0100_0001);
+        assert_eq!(want.0[7].map(f64::from_bits), [1.5, 1e-200, 4.0, 5.0, 2.0, 7.0, 1e300, f64::INFINITY]);
+        assert_eq!((f64::from_bits(want.0[8][2]), f64::from_bits(want.0[9][2])), (1.0, 2.0));
+        for isa in Isa::all() {
+            assert_eq!(run_wide(isa, All(a, b)), want, "{isa:?}");
+        }
+    }
+}
