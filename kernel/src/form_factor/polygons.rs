@@ -3,7 +3,9 @@
 use super::convex::double_area;
 use super::cubature::RULES;
 use super::pair::{exchange_area_with, power_of_two_below};
-use super::product::{BEHIND, Block, Classes, EXACT, Eight, NO_PLACES, Places, Product, Rule, SHAPES, Shape};
+use super::product::{
+    BEHIND, Block, Classes, EXACT, Eight, PLACES, Place, Places, Product, Rule, SHAPES, Shape,
+};
 use crate::arena::{Arena, Need};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut};
@@ -180,7 +182,7 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
         // Whatever its shape, a patch is two triangles.
         let [first_rule, second_rule] =
             [worst.0, worst.1].map(|number| Rule { number: number.into(), shape: Shape::Quadrilateral });
-        let (mut first, mut second, mut places) = (Block::EMPTY, Block::EMPTY, NO_PLACES);
+        let (mut first, mut second, mut places) = (Block::EMPTY, Block::EMPTY, [Place::NONE; PLACES]);
         let (mut lane, mut sum) = (0, 0.0);
         let mut add = |first: &Block, second: &Block, lanes: usize| {
             let product = Product { first, first_rule, second, second_rule, places: &mut places };
@@ -271,7 +273,7 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
             own: polygons.block(patch).spread(patch % WIDTH),
             shape: polygons.block(patch).shape(patch % WIDTH),
             gathered: Block::EMPTY,
-            places: NO_PLACES,
+            places: [Place::NONE; PLACES],
             queues: [Queue { patches: [0; WIDTH], count: 0 }; SHAPES * RULES * RULES],
         }
     }

@@ -189,10 +189,14 @@ impl<F: Wide> Wide3<F> {
 #[repr(align(64))]
 pub(super) struct Place([Eight; 4]);
 
-/// Room for the points of one side.
-pub(super) type Places = [Place; 2 * LARGEST];
+/// Room for the points of one side: of a quadrilateral, those of two triangles.
+pub(super) type Places = [Place; PLACES];
 
-pub(super) const NO_PLACES: Places = [Place([[0.0; WIDTH]; 4]); 2 * LARGEST];
+pub(super) const PLACES: usize = 2 * LARGEST;
+
+impl Place {
+    pub(super) const NONE: Place = Place([[0.0; WIDTH]; 4]);
+}
 
 /// The rule of a side.
 #[derive(Clone, Copy)]
