@@ -3,6 +3,7 @@
 use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
 use super::patch::{Patch, patches};
+use super::rule::Rule;
 use crate::math::{FRAC_1_PI, Vec3, sqrt, unit};
 use crate::simd::Isa;
 use core::cmp::Ordering;
@@ -111,31 +112,43 @@ fn exchange(isa: Isa, a: &Convex, b: &Convex) -> f64 {
 }
 
 /// The area form, free of cancellation: over all patches of both polygons, split until far enough apart; none
-/// where that takes more than `splits` splits.
+/// where that takes more than `splits` splits, which is found before any is computed: polygons that touch never do.
 fn by_area(a: &Convex, na: Vec3, b: &Convex, nb: Vec3, splits: u32) -> Option<f64> {
+    let pairs = || patches(a.corners()).flat_map(|p| patches(b.corners()).map(move |q| (p, q)));
     let mut left = splits;
-    let mut sum = 0.0;
-    for p in patches(a.corners()) {
-        for q in patches(b.corners()) {
-            sum += split_product((&p, na), (&q, nb), DEPTH, &mut left)?;
-        }
+    for (p, q) in pairs() {
+        split(&p, &q, DEPTH, &mut left, &mut |_, _, _| {})?;
+    }
+    let (mut left, mut sum) = (splits, 0.0);
+    for (p, q) in pairs() {
+        split(&p, &q, DEPTH, &mut left, &mut |p, q, rule| sum += Patch::product(p, na, q, nb, rule))?;
     }
     Some(sum)
 }
 
-/// The exchange area of two patches, each with its unit normal, by Gauss points; split while too near for that.
-fn split_product(a: (&Patch, Vec3), b: (&Patch, Vec3), depth: u32, left: &mut u32) -> Option<f64> {
-    if let Some(rule) = Patch::rule(a.0, b.0) {
-        return Some(Patch::product(a.0, a.1, b.0, b.1, rule));
+/// Halves two patches until each pair of parts is far enough apart for a rule, and gives those to `work`; none where that
+/// takes too many splits.
+fn split(
+    a: &Patch,
+    b: &Patch,
+    depth: u32,
+    left: &mut u32,
+    work: &mut impl FnMut(&Patch, &Patch, Rule),
+) -> Option<()> {
+    if let Some(rule) = Patch::rule(a, b) {
+        work(a, b, rule);
+        return Some(());
     }
     *left = left.checked_sub(1)?;
     let depth = depth.checked_sub(1)?;
-    if a.0.size() >= b.0.size() {
-        let (lower, upper) = a.0.halves();
-        Some(split_product((&lower, a.1), b, depth, left)? + split_product((&upper, a.1), b, depth, left)?)
+    if a.size() >= b.size() {
+        let (lower, upper) = a.halves();
+        split(&lower, b, depth, left, work)?;
+        split(&upper, b, depth, left, work)
     } else {
-        let (lower, upper) = b.0.halves();
-        Some(split_product(a, (&lower, b.1), depth, left)? + split_product(a, (&upper, b.1), depth, left)?)
+        let (lower, upper) = b.halves();
+        split(a, &lower, depth, left, work)?;
+        split(a, &upper, depth, left, work)
     }
 }
 
