@@ -80,7 +80,7 @@ fn hemisphere(scene: &Scene<'_>, each: u32) -> Vec<Ray> {
 
 /// Form factors of a bowl's facets, of which many touch and some cross each other's planes.
 fn factors() {
-    Case::new(bowl(10), 0.3, 0.0).with_input(|input| {
+    Case::new(bowl(6), 0.3, 0.0).with_input(|input| {
         let mut memory = Memory::new(Scene::bytes(input).expect("a sound scene"));
         let scene = Scene::new(input, memory.bytes_mut()).expect("a sound scene");
         let mut memory = Memory::new(Polygons::bytes(scene.corners()).expect("few facets"));
