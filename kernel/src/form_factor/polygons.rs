@@ -117,8 +117,8 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
             return Err(Error::Length { what: "exchange areas", expected, given: areas.len() });
         }
         areas.fill(0.0);
-        let middle = row.clamp(columns.start, columns.end);
-        let after = (row + 1).clamp(columns.start, columns.end);
+        let middle = row.max(columns.start).min(columns.end);
+        let after = (row + 1).max(columns.start).min(columns.end);
         let (low, high) = areas.split_at_mut_checked(middle - columns.start).unwrap_or((&mut [], &mut []));
         let high = high.get_mut(after - middle..).unwrap_or(&mut []);
         if !low.is_empty() {
