@@ -3,6 +3,7 @@
 use crate::scene::{Case, EYE, OTHER_EYE, Values, bowl, image};
 use blik_kernel::arena::Memory;
 use blik_kernel::bvh::Bvh;
+use blik_kernel::form_factor::Polygons;
 use blik_kernel::host::{Geometry, GeometryMemory, Host, Lit, Settings};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
@@ -12,8 +13,8 @@ use blik_kernel::sky::SkyModel;
 use std::hint::black_box;
 
 /// What is counted; the function of each is `counted_NAME`.
-pub const NAMES: [&str; 9] =
-    ["tree", "closest", "occluded", "geometry", "light", "relight", "image", "signature", "bands"];
+pub const NAMES: [&str; 10] =
+    ["tree", "closest", "occluded", "factors", "geometry", "light", "relight", "image", "signature", "bands"];
 
 /// Pixels along each side of the images.
 const PIXELS: usize = 32;
@@ -21,6 +22,7 @@ const PIXELS: usize = 32;
 /// Runs all of it once.
 pub fn run() {
     rays();
+    factors();
     let host = Host::new(1).expect("a thread");
     let case = Case { settings: coarse(), ..Case::new(bowl(6), 0.3, 0.1) };
     let (mut memory, values) = (GeometryMemory::default(), Values::new(1));
@@ -76,6 +78,19 @@ fn hemisphere(scene: &Scene<'_>, each: u32) -> Vec<Ray> {
     (0..scene.facets()).flat_map(of).collect()
 }
 
+/// Form factors of a bowl's facets, of which many touch and some cross each other's planes.
+fn factors() {
+    Case::new(bowl(6), 0.3, 0.0).with_input(|input| {
+        let mut memory = Memory::new(Scene::bytes(input).expect("a sound scene"));
+        let scene = Scene::new(input, memory.bytes_mut()).expect("a sound scene");
+        let mut memory = Memory::new(Polygons::bytes(scene.corners()).expect("few facets"));
+        let mut areas = vec![0.0; scene.facets()];
+        counted_setup();
+        counted_factors(scene.corners(), &mut memory, &mut areas);
+        black_box(areas);
+    });
+}
+
 /// Ends what belongs to no count.
 #[inline(never)]
 fn counted_setup() {
@@ -95,6 +110,15 @@ fn counted_closest(bvh: &Bvh<'_>, rays: &[Ray]) -> usize {
 #[inline(never)]
 fn counted_occluded(bvh: &Bvh<'_>, rays: &[Ray]) -> usize {
     rays.iter().filter(|ray| bvh.occluded(ray)).count()
+}
+
+#[inline(never)]
+fn counted_factors(corners: &[[Vec3; 3]], memory: &mut Memory, areas: &mut [f64]) {
+    let polygons = Polygons::new(Isa::detect(), corners, memory.bytes_mut()).expect("enough memory");
+    for row in 0..corners.len() {
+        polygons.exchange_areas(row, row..corners.len(), &mut areas[row..]).expect("a row");
+        black_box(&areas);
+    }
 }
 
 #[inline(never)]

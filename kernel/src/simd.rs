@@ -2,6 +2,10 @@
 //!
 //! The same source is compiled once per instruction set; none contracts `a * b + c`, so all give the same bits.
 
+mod wide;
+
+pub use wide::{Lanes64, WIDTH, Wide, WideTask};
+
 /// An instruction set for which the hot loops were compiled. Its values come from [`Isa::detect`] and
 /// [`Isa::BASELINE`] alone, so that holding one proves that the processor has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +16,9 @@ enum Level {
     Baseline,
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// AVX-512F, and AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl Isa {
@@ -23,11 +30,29 @@ impl Isa {
         #[cfg(target_arch = "x86_64")]
         {
             cpufeatures::new!(avx2, "avx2");
+            cpufeatures::new!(avx512, "avx512f");
+            if avx2::get() && avx512::get() {
+                return Isa(Level::Avx512);
+            }
             if avx2::get() {
                 return Isa(Level::Avx2);
             }
         }
         Isa::BASELINE
+    }
+
+    /// Those that this processor has.
+    #[cfg(test)]
+    pub(crate) fn all() -> impl Iterator<Item = Isa> {
+        #[cfg(target_arch = "x86_64")]
+        let all = match Isa::detect().0 {
+            Level::Baseline => &[Level::Baseline][..],
+            Level::Avx2 => &[Level::Baseline, Level::Avx2],
+            Level::Avx512 => &[Level::Baseline, Level::Avx2, Level::Avx512],
+        };
+        #[cfg(not(target_arch = "x86_64"))]
+        let all = [Level::Baseline];
+        all.iter().map(|level| Isa(*level))
     }
 }
 
@@ -44,12 +69,12 @@ pub trait Task {
 #[allow(unsafe_code)]
 pub fn run<T: Task>(isa: Isa, task: T) -> T::Out {
     #[cfg(target_arch = "x86_64")]
-    if isa.0 == Level::Avx2 {
+    if isa != Isa::BASELINE {
         #[target_feature(enable = "avx2")]
         fn avx2<T: Task>(task: T) -> T::Out {
             task.run()
         }
-        // SAFETY: `Level::Avx2` comes from `Isa::detect` alone, which saw the processor's flag.
+        // SAFETY: levels other than the baseline come from `Isa::detect` alone, which saw the processor's flag.
         return unsafe { avx2(task) };
     }
     let _ = isa;
@@ -106,16 +131,42 @@ pub trait LaneTask {
 #[allow(unsafe_code)]
 pub fn run_lanes<T: LaneTask>(isa: Isa, task: T) -> T::Out {
     #[cfg(target_arch = "x86_64")]
-    if isa.0 == Level::Avx2 {
+    if isa != Isa::BASELINE {
         #[target_feature(enable = "avx2")]
         fn avx2<T: LaneTask>(task: T) -> T::Out {
             task.run(avx2::Avx2::new())
         }
-        // SAFETY: `Level::Avx2` comes from `Isa::detect` alone, which saw the processor's flag.
+        // SAFETY: levels other than the baseline come from `Isa::detect` alone, which saw the processor's flag.
         return unsafe { avx2(task) };
     }
     let _ = isa;
     task.run(Arrays)
+}
+
+/// Runs `task` with the lanes of `isa`.
+#[inline(always)]
+#[allow(unsafe_code)]
+pub fn run_wide<T: WideTask>(isa: Isa, task: T) -> T::Out {
+    #[cfg(target_arch = "x86_64")]
+    {
+        #[target_feature(enable = "avx2")]
+        fn avx2<T: WideTask>(task: T) -> T::Out {
+            task.run(wide::avx2::Avx2::new())
+        }
+        #[target_feature(enable = "avx512f")]
+        fn avx512<T: WideTask>(task: T) -> T::Out {
+            task.run(wide::avx512::Avx512::new())
+        }
+        match isa.0 {
+            Level::Baseline => {}
+            // SAFETY: levels other than the baseline come from `Isa::detect` alone, which saw the processor's flags.
+            Level::Avx2 => return unsafe { avx2(task) },
+            // SAFETY: as above.
+            Level::Avx512 => return unsafe { avx512(task) },
+        }
+    }
+    let _ = isa;
+    task.run(wide::Arrays)
 }
 
 /// Lanes as arrays: any processor.

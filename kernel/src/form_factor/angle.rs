@@ -1,6 +1,7 @@
 //! The angle of a vector in the upper half plane, as straight-line code that vectorises.
 
 use crate::math::{FRAC_PI_2, PI};
+use crate::simd::{Lanes64, Wide};
 
 /// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
 const LOW: f64 = 0.414_213_562_373_095_05;
@@ -39,6 +40,26 @@ pub(super) fn angle(y: f64, x: f64) -> f64 {
     select(x < 0.0, PI - acute, acute)
 }
 
+/// [`angle`] in explicit lanes.
+#[inline(always)]
+pub(super) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
+    let (zero, least) = (lanes.all(0.0), lanes.all(f64::MIN_POSITIVE));
+    let wide = x.abs();
+    let (steep, slanted) = (y.gt(lanes.all(HIGH) * wide), y.gt(lanes.all(LOW) * wide));
+    let above = (zero - wide).where_else(steep, (y - wide).where_else(slanted, y));
+    let below = y.where_else(steep, (y + wide).where_else(slanted, wide));
+    let turn = lanes.all(FRAC_PI_2).where_else(steep, lanes.all(0.5 * FRAC_PI_2).where_else(slanted, zero));
+    let z = above / below.max(least);
+    let z2 = z * z;
+    let (z4, c) = (z2 * z2, ATAN);
+    let z8 = z4 * z4;
+    let low = (lanes.all(c[0]) + lanes.all(c[1]) * z2) + (lanes.all(c[2]) + lanes.all(c[3]) * z2) * z4;
+    let mid = (lanes.all(c[4]) + lanes.all(c[5]) * z2) + (lanes.all(c[6]) + lanes.all(c[7]) * z2) * z4;
+    let high = (lanes.all(c[8]) + lanes.all(c[9]) * z2) + lanes.all(c[10]) * z4;
+    let acute = turn + z * (low + (mid + high * z8) * z8);
+    (lanes.all(PI) - acute).where_else(zero.gt(x), acute)
+}
+
 /// atan(z)/z, by Estrin's scheme: half as many operations wait for one another as in Horner's.
 #[inline(always)]
 fn arc_tangent_series(z2: f64) -> f64 {
@@ -62,6 +83,35 @@ fn select(condition: bool, yes: f64, no: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::math::{atan2, cos, sin};
+    use crate::simd::{Isa, WIDTH, WideTask, run_wide};
+
+    struct Angles([f64; WIDTH], [f64; WIDTH]);
+
+    impl WideTask for Angles {
+        type Out = [f64; WIDTH];
+
+        #[inline(always)]
+        fn run<L: Lanes64>(self, lanes: L) -> [f64; WIDTH] {
+            wide_angle(lanes, lanes.of(&self.0), lanes.of(&self.1)).array()
+        }
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_one() {
+        for k in 0..1000 {
+            let at = |n: usize| PI * (k * WIDTH + n) as f64 / 7999.0;
+            let y: [f64; WIDTH] = core::array::from_fn(|n| sin(at(n)).max(0.0));
+            let x: [f64; WIDTH] = core::array::from_fn(|n| cos(at(n)));
+            let want: [f64; WIDTH] = core::array::from_fn(|n| angle(y[n], x[n]));
+            for isa in Isa::all() {
+                assert_eq!(run_wide(isa, Angles(y, x)), want);
+            }
+        }
+        let (y, x) =
+            ([0.0, 0.0, 0.0, 1.0, 1e-300, 0.0, 1.0, 1.0], [0.0, 1.0, -1.0, 0.0, 1.0, -0.0, 1.0, -1.0]);
+        let want: [f64; WIDTH] = core::array::from_fn(|n| angle(y[n], x[n]));
+        assert_eq!(run_wide(Isa::BASELINE, Angles(y, x)), want);
+    }
 
     /// 1e-15: the polynomial's 3e-17 and five roundings of numbers up to pi.
     #[test]

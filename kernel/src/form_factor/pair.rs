@@ -3,7 +3,9 @@
 use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
 use super::patch::{Patch, patches};
+use super::rule::Rule;
 use crate::math::{FRAC_1_PI, Vec3, sqrt, unit};
+use crate::simd::Isa;
 use core::cmp::Ordering;
 
 /// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.
@@ -37,6 +39,11 @@ pub fn polygon_to_polygon(a: &[Vec3], b: &[Vec3]) -> f64 {
 /// within 3e-9.) Where polygons of very unlike extent touch, rounding adds 1e-16 L_a L_b / (A_a F_ab) for
 /// perimeters L.
 pub fn exchange_area(a: &[Vec3], b: &[Vec3]) -> f64 {
+    exchange_area_with(Isa::BASELINE, a, b)
+}
+
+/// [`exchange_area`] on an instruction set, with the same bits.
+pub(super) fn exchange_area_with(isa: Isa, a: &[Vec3], b: &[Vec3]) -> f64 {
     let limit = 0.5 * length(double_area(a)).min(length(double_area(b)));
     let (first, second) = if in_order(a, b) { (a, b) } else { (b, a) };
     let Some(origin) = first.first() else {
@@ -51,7 +58,7 @@ pub fn exchange_area(a: &[Vec3], b: &[Vec3]) -> f64 {
     let mut sum = 0.0;
     for p in pieces(first).map(local) {
         for q in pieces(second).map(local) {
-            sum += exchange(&p, &q);
+            sum += exchange(isa, &p, &q);
         }
     }
     let value = sum * scale * scale;
@@ -70,7 +77,7 @@ fn in_order(a: &[Vec3], b: &[Vec3]) -> bool {
 }
 
 /// The power of two in (x/2, x]; none where x is zero, subnormal, not finite or its square overflows.
-fn power_of_two_below(x: f64) -> Option<f64> {
+pub(super) fn power_of_two_below(x: f64) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff << 52;
     (x > 1e-150 && x < 1e150).then(|| f64::from_bits(x.to_bits() & EXPONENT))
 }
@@ -87,7 +94,7 @@ pub(super) fn fronts(a: &Convex, b: &Convex) -> Option<(Convex, Convex)> {
 }
 
 /// Exchange area of two pieces whose extent is about 1.
-fn exchange(a: &Convex, b: &Convex) -> f64 {
+fn exchange(isa: Isa, a: &Convex, b: &Convex) -> f64 {
     let (Some(na), Some(nb)) = (unit(double_area(a.corners())), unit(double_area(b.corners()))) else {
         return 0.0;
     };
@@ -97,7 +104,7 @@ fn exchange(a: &Convex, b: &Convex) -> f64 {
     if let Some(sum) = by_area(&front_a, na, &front_b, nb, 0) {
         return sum;
     }
-    let sum = contour::integral(&front_a, &front_b).max(0.0) * (0.5 * FRAC_1_PI);
+    let sum = contour::integral(isa, &front_a, &front_b).max(0.0) * (0.5 * FRAC_1_PI);
     if sum * CANCELLATION < perimeter(&front_a) * perimeter(&front_b) {
         return by_area(&front_a, na, &front_b, nb, BUDGET).unwrap_or(sum);
     }
@@ -105,31 +112,43 @@ fn exchange(a: &Convex, b: &Convex) -> f64 {
 }
 
 /// The area form, free of cancellation: over all patches of both polygons, split until far enough apart; none
-/// where that takes more than `splits` splits.
+/// where that takes more than `splits` splits, which is found before any is computed: polygons that touch never do.
 fn by_area(a: &Convex, na: Vec3, b: &Convex, nb: Vec3, splits: u32) -> Option<f64> {
+    let pairs = || patches(a.corners()).flat_map(|p| patches(b.corners()).map(move |q| (p, q)));
     let mut left = splits;
-    let mut sum = 0.0;
-    for p in patches(a.corners()) {
-        for q in patches(b.corners()) {
-            sum += split_product((&p, na), (&q, nb), DEPTH, &mut left)?;
-        }
+    for (p, q) in pairs() {
+        split(&p, &q, DEPTH, &mut left, &mut |_, _, _| {})?;
+    }
+    let (mut left, mut sum) = (splits, 0.0);
+    for (p, q) in pairs() {
+        split(&p, &q, DEPTH, &mut left, &mut |p, q, rule| sum += Patch::product(p, na, q, nb, rule))?;
     }
     Some(sum)
 }
 
-/// The exchange area of two patches, each with its unit normal, by Gauss points; split while too near for that.
-fn split_product(a: (&Patch, Vec3), b: (&Patch, Vec3), depth: u32, left: &mut u32) -> Option<f64> {
-    if let Some(rule) = Patch::rule(a.0, b.0) {
-        return Some(Patch::product(a.0, a.1, b.0, b.1, rule));
+/// Halves two patches until each pair of parts is far enough apart for a rule, and gives those to `work`; none where that
+/// takes too many splits.
+fn split(
+    a: &Patch,
+    b: &Patch,
+    depth: u32,
+    left: &mut u32,
+    work: &mut impl FnMut(&Patch, &Patch, Rule),
+) -> Option<()> {
+    if let Some(rule) = Patch::rule(a, b) {
+        work(a, b, rule);
+        return Some(());
     }
     *left = left.checked_sub(1)?;
     let depth = depth.checked_sub(1)?;
-    if a.0.size() >= b.0.size() {
-        let (lower, upper) = a.0.halves();
-        Some(split_product((&lower, a.1), b, depth, left)? + split_product((&upper, a.1), b, depth, left)?)
+    if a.size() >= b.size() {
+        let (lower, upper) = a.halves();
+        split(&lower, b, depth, left, work)?;
+        split(&upper, b, depth, left, work)
     } else {
-        let (lower, upper) = b.0.halves();
-        Some(split_product(a, (&lower, b.1), depth, left)? + split_product(a, (&upper, b.1), depth, left)?)
+        let (lower, upper) = b.halves();
+        split(a, &lower, depth, left, work)?;
+        split(a, &upper, depth, left, work)
     }
 }
 

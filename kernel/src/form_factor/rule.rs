@@ -30,5 +30,3 @@ pub(super) const GAUSS_3: Rule = Rule::of(&const { Gauss::<3>::new() });
 pub(super) const GAUSS_4: Rule = Rule::of(&const { Gauss::<4>::new() });
 pub(super) const GAUSS_5: Rule = Rule::of(&const { Gauss::<5>::new() });
 pub(super) const GAUSS_6: Rule = Rule::of(&const { Gauss::<6>::new() });
-pub(super) const GAUSS_10: Rule = Rule::of(&const { Gauss::<10>::new() });
-pub(super) const GAUSS_16: Rule = Rule::of(&const { Gauss::<16>::new() });
