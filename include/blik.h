@@ -2334,25 +2334,41 @@ int32_t blik_image_rows(const struct blik_solution *solution,
                         struct blik_tally *tally);
 
 /**
+ * Bytes of scratch memory with which blik_radiance and blik_signatures keep all lanes of `run` busy.
+ */
+int32_t blik_radiance_scratch_size(const struct blik_solution *solution,
+                                   const struct blik_run *run,
+                                   struct blik_error *error,
+                                   size_t *bytes);
+
+/**
  * Radiance against each of `count` rays of any origin and direction: `radiance` has one value per band for each.
+ *
+ * `scratch` is memory of blik_radiance_scratch_size bytes, or less, for fewer lanes; with the standard library it
+ * may be null, and is then taken from the heap.
  */
 int32_t blik_radiance(const struct blik_solution *solution,
                       const struct blik_ray *rays,
                       size_t count,
                       const struct blik_run *run,
+                      void *scratch,
+                      size_t scratch_size,
                       struct blik_error *error,
                       double *radiance);
 
 /**
  * What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
  * from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
- * one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`.
+ * one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`. Scratch memory as for
+ * blik_radiance.
  */
 int32_t blik_signatures(const struct blik_solution *solution,
                         const double *directions,
                         size_t views,
                         size_t cells,
                         const struct blik_run *run,
+                        void *scratch,
+                        size_t scratch_size,
                         struct blik_error *error,
                         struct blik_signature *signatures);
 

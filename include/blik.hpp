@@ -141,6 +141,23 @@ inline void run_on_threads(void *, std::size_t count, blik_task task, void *cont
     }
 }
 
+/* Scratch memory of the size that `size` tells. */
+class scratch {
+public:
+    template <typename Size>
+    explicit scratch(Size size) {
+        blik_error info{};
+        check(size(&info, &size_), info);
+        memory_.reset(new unsigned char[size_]);
+    }
+    unsigned char *data() const noexcept { return memory_.get(); }
+    std::size_t size() const noexcept { return size_; }
+
+private:
+    std::unique_ptr<unsigned char[]> memory_;
+    std::size_t size_ = 0;
+};
+
 /* Frees a handle and, without the standard library, the memory in which it stands. */
 template <typename H>
 class owner {
@@ -522,11 +539,10 @@ public:
         blik::image out{camera.columns, camera.rows, bands_, {}, {}};
         out.pixels.resize(camera.columns * camera.rows * bands_);
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_image_scratch_size(get(), &camera, &run, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(blik_image(get(), &camera, &run, scratch.get(), bytes, &info, out.pixels.data(), out.pixels.size(),
-                         nullptr, &out.tally),
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_image_scratch_size(get(), &camera, &run, e, bytes); });
+        check(blik_image(get(), &camera, &run, scratch.data(), scratch.size(), &info, out.pixels.data(),
+                         out.pixels.size(), nullptr, &out.tally),
               info);
         return out;
     }
@@ -535,11 +551,10 @@ public:
         blik::image out{camera.columns, rows, bands_, {}, {}};
         out.pixels.resize(camera.columns * rows * bands_);
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_image_scratch_size(get(), &camera, nullptr, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(blik_image_rows(get(), &camera, first, rows, scratch.get(), bytes, &info, out.pixels.data(),
-                              out.pixels.size(), nullptr, &out.tally),
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_image_scratch_size(get(), &camera, nullptr, e, bytes); });
+        check(blik_image_rows(get(), &camera, first, rows, scratch.data(), scratch.size(), &info,
+                              out.pixels.data(), out.pixels.size(), nullptr, &out.tally),
               info);
         return out;
     }
@@ -556,14 +571,21 @@ public:
         std::vector<blik_signature> out(directions.size() * bands_);
         blik_error info{};
         const double *first = directions.empty() ? nullptr : directions.data()->data();
-        check(blik_signatures(get(), first, directions.size(), cells, &run, &info, out.data()), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_radiance_scratch_size(get(), &run, e, bytes); });
+        check(blik_signatures(get(), first, directions.size(), cells, &run, scratch.data(), scratch.size(), &info,
+                              out.data()),
+              info);
         return out;
     }
     /* Radiance against each ray, one value per band. */
     std::vector<double> radiance(view<const blik_ray> rays, const blik_run &run = alone()) const {
         std::vector<double> out(rays.size() * bands_);
         blik_error info{};
-        check(blik_radiance(get(), rays.data(), rays.size(), &run, &info, out.data()), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_radiance_scratch_size(get(), &run, e, bytes); });
+        check(blik_radiance(get(), rays.data(), rays.size(), &run, scratch.data(), scratch.size(), &info, out.data()),
+              info);
         return out;
     }
     /* All facets of the scene that it was made of. */
@@ -910,10 +932,9 @@ private:
     template <typename F>
     void with_scratch(const blik_run &run, F call) const {
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_plane_scratch_size(get(), &run, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(call(scratch.get(), bytes, &info), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_plane_scratch_size(get(), &run, e, bytes); });
+        check(call(scratch.data(), scratch.size(), &info), info);
     }
     detail::owner<blik_plane_solution> owner_;
 };

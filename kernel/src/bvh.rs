@@ -50,8 +50,11 @@ const NONE: u32 = u32::MAX;
 /// Facets a leaf holds at most, and the width of a packet.
 const LANES: usize = 8;
 
-/// Entries of a stack that the deepest tree needs: seven for each of at most 69 levels, and one.
-const STACK: usize = 512;
+/// Levels of the deepest tree.
+const MOST_LEVELS: usize = 32;
+
+/// Entries of a stack that the deepest tree needs: seven for each level, and one.
+const STACK: usize = MOST_LEVELS * 7 + 1;
 
 /// Facet count is kept below this, so that lane and node numbers fit beside the bits of a child.
 const MOST: usize = 1 << 28;

@@ -76,6 +76,8 @@ plain_table! {
         pub squares: [f64; MAX_BANDS],
         /// The sums before the latest ray.
         pub before: [f64; MAX_BANDS],
+        /// What an image of the sun brings, and the product of the reflectances on the way to it.
+        pub images: [[f64; MAX_BANDS]; 2],
     }
 }
 
@@ -86,6 +88,7 @@ impl Work {
         sums: Terms::ZERO,
         squares: [0.0; MAX_BANDS],
         before: [0.0; MAX_BANDS],
+        images: [[0.0; MAX_BANDS]; 2],
     };
 }
 
@@ -210,6 +213,8 @@ struct Leg<'w> {
     lobes: u32,
     /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
     lobe: bool,
+    /// For the sun's images.
+    images: &'w mut [[f64; MAX_BANDS]; 2],
 }
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
@@ -303,9 +308,9 @@ impl Solved<'_> {
         work: &mut Work,
     ) -> Path {
         let mut path = Path::default();
-        let Work { through: [through, next], sums, squares, before } = work;
+        let Work { through: [through, next], sums, squares, before, images } = work;
         through.head_mut(self.shape.bands).fill(1.0);
-        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false };
+        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
         let mut fan = Fan { terms: sums, path, squares, before, through: next, count: 0 };
         self.follow(leg, hit, sample, terms, &mut path, Some(&mut fan));
         path
@@ -329,7 +334,7 @@ impl Solved<'_> {
             };
             path.object |= leg.mirrors == 0;
             let Some(surface) = Surface::of_hit(self.scene, &met) else { return };
-            self.add_diffuse(&leg, &surface, sample, terms, path);
+            self.add_diffuse(&mut leg, &surface, sample, terms, path);
             let Some(mirror) = surface.mirror(self.scene) else { return };
             if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
                 return;
@@ -452,7 +457,7 @@ impl Solved<'_> {
     }
 
     /// One more ray of the lobe that `leg` has met, to its end.
-    fn add_ray(&self, leg: &Leg<'_>, ray: &Ray, sample: Sample, fan: &mut Fan<'_>) {
+    fn add_ray(&self, leg: &mut Leg<'_>, ray: &Ray, sample: Sample, fan: &mut Fan<'_>) {
         let bands = self.shape.bands;
         let Fan { terms, path, squares, before, through, count } = fan;
         before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = terms.sum(b));
@@ -460,7 +465,8 @@ impl Solved<'_> {
         path.rays += 1;
         let of = Sample::OneOf { seed: sample.seed(), index: *count };
         let hit = self.bvh.closest(ray);
-        let leg = Leg { ray: *ray, through, mirrors: leg.mirrors, lobes: leg.lobes, lobe: true };
+        let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
+        let leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
         self.follow(leg, hit, of, terms, path, None);
         for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
             let value = terms.sum(b) - before;
@@ -469,7 +475,8 @@ impl Solved<'_> {
         *count += 1;
     }
 
-    /// The chain leaves the object: sky, and the sun's disc.
+    /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.
+    #[inline(never)]
     fn escape(&self, leg: &Leg<'_>, terms: &mut Terms) {
         let bands = self.shape.bands;
         if let Some(sky) = &self.light.sky {
@@ -492,7 +499,7 @@ impl Solved<'_> {
     #[inline]
     fn add_diffuse(
         &self,
-        leg: &Leg<'_>,
+        leg: &mut Leg<'_>,
         surface: &Surface,
         sample: Sample,
         terms: &mut Terms,

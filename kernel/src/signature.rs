@@ -82,13 +82,23 @@ impl Sums {
 /// The sums over each row of cells in `range`: one ray in each cell, spread over the cells by a low-discrepancy
 /// sequence. Error of the sums over all n^2 cells: about n^-3/2 of the value for the outline, less inside.
 pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Sums]) -> Result<(), Error> {
+    rows_in(solved, view, range, (&mut { Terms::ZERO }, &mut { Work::ZERO }), out)
+}
+
+/// The same in the caller's memory, of any content.
+pub fn rows_in(
+    solved: &Solved<'_>,
+    view: &View,
+    range: Range<usize>,
+    (terms, work): (&mut Terms, &mut Work),
+    out: &mut [Sums],
+) -> Result<(), Error> {
     if out.len() != range.len() {
         return Err(Error::Length { what: "signature rows", expected: range.len(), given: out.len() });
     }
     let bands = solved.shape.bands;
     let scale = solved.scene.scale();
     let area = view.cell_area / (scale * scale);
-    let (mut terms, mut work) = (Terms::ZERO, Work::ZERO);
     for (row, sums) in range.zip(out) {
         *sums = Sums::ZERO;
         let sequence = Sequence::new(hash2(row as u32, 0x5160_0000));
@@ -107,8 +117,8 @@ pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Su
             let path = solved.radiance_at(
                 (&ray, hit),
                 Sample::OneOf { seed: row as u32, index: column },
-                &mut terms,
-                &mut work,
+                terms,
+                work,
             );
             sums.rays += 1 + u64::from(path.rays);
             if path.object {

@@ -431,6 +431,7 @@ fn middle(point: usize) -> (f64, f64) {
 
 /// Unevenness by the product of both halves' residuals about their best linear functions over the points seen, and the
 /// noise of a half in it. `half` and `all` are sums over the first half's and all rays; a half has `rays` rays.
+#[inline(never)]
 fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64, f64) {
     let count = seen.iter().filter(|s| **s).count() as f64;
     if count == 0.0 {

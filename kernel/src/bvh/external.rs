@@ -6,8 +6,9 @@ use crate::math::Vec3;
 use crate::ray::{self, Hit, Ray};
 use core::fmt;
 
-/// Most rays that an [`Intersector`] is asked for at once.
-pub const BATCH: usize = 32;
+/// Most rays that an [`Intersector`] is asked for at once: they wait on the stack, which is small where there is no
+/// standard library.
+pub const BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
 
 /// No facet among the answers.
 pub const NO_FACET: u32 = u32::MAX;

@@ -4,18 +4,18 @@
 //! and nothing that a ray finds decides where another goes, so that the processor works ahead. Children follow in the
 //! order of their distance from the ray to which they are nearest.
 
-use super::traverse::{Beam, SHORT, Walk};
+use super::traverse::{self, Beam, SHORT, Walk};
 use super::{Bvh, LEAF, PAIR, STACK};
 use crate::index::IndexMut;
 use crate::ray::{Hit, Ray};
 use crate::simd::{self, LaneTask, Lanes};
 
-/// Words of a set of rays. Large groups are faster (128 rays of a facet trace at 1.2 times the speed of 64) and take
-/// stack, some 120 bytes a ray, which small machines lack.
-const WORDS: usize = if cfg!(all(target_pointer_width = "64", not(target_os = "none"))) { 4 } else { 1 };
+/// Rays of a group. Large groups are faster (128 rays of a facet trace at 1.2 times the speed of 64) and take stack, some
+/// 250 bytes a ray with what a caller keeps of each, which machines without the standard library lack.
+pub(crate) const GROUP: usize = if cfg!(feature = "std") { 128 } else { 8 };
 
-/// Rays of a group.
-pub(crate) const GROUP: usize = WORDS * 32;
+/// Words of a set of rays.
+const WORDS: usize = GROUP.div_ceil(32);
 
 type Set = [u32; WORDS];
 
@@ -44,17 +44,25 @@ pub(super) fn occluded(bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
 }
 
 fn search<const ANY: bool>(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    if bvh.levels * 7 < SHORT {
-        simd::run_lanes(bvh.isa, Search::<ANY, SHORT> { bvh, rays, hits });
-    } else {
-        deep::<ANY>(bvh, rays, hits);
-    }
+    if bvh.levels * 7 < SHORT { short::<ANY>(bvh, rays, hits) } else { deep::<ANY>(bvh, rays, hits) }
 }
 
-/// Apart, so that only who has a deep tree pays for the long stack.
+/// Apart, so that its stack is no burden to what the caller does with the hits.
+#[inline(never)]
+fn short<const ANY: bool>(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
+    simd::run_lanes(bvh.isa, Search::<ANY, SHORT> { bvh, rays, hits });
+}
+
+/// Apart, so that only who has a deep tree pays for the long stack; small stacks have no room for it.
 #[inline(never)]
 fn deep<const ANY: bool>(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    simd::run_lanes(bvh.isa, Search::<ANY, STACK> { bvh, rays, hits });
+    if cfg!(feature = "std") {
+        simd::run_lanes(bvh.isa, Search::<ANY, STACK> { bvh, rays, hits });
+        return;
+    }
+    for (ray, hit) in rays.iter().zip(hits) {
+        *hit = traverse::search_deep::<ANY>(bvh, ray);
+    }
 }
 
 /// The search for the first hits, or for any, of one group.

@@ -38,12 +38,13 @@ pub(super) const SHORT: usize = 64;
 
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    if bvh.levels * 7 < SHORT { search::<false, SHORT>(bvh, ray) } else { deep::<false>(bvh, ray) }
+    if bvh.levels * 7 < SHORT { search_short::<false>(bvh, ray) } else { search_deep::<false>(bvh, ray) }
 }
 
 /// See [`Bvh::occluded`].
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
-    let hit = if bvh.levels * 7 < SHORT { search::<true, SHORT>(bvh, ray) } else { deep::<true>(bvh, ray) };
+    let shallow = bvh.levels * 7 < SHORT;
+    let hit = if shallow { search_short::<true>(bvh, ray) } else { search_deep::<true>(bvh, ray) };
     hit.is_some()
 }
 
@@ -52,9 +53,15 @@ fn search<const ANY: bool, const N: usize>(bvh: &Bvh, ray: &Ray) -> Option<Hit> 
     simd::run_lanes(bvh.isa, Search::<ANY, N> { bvh, ray })
 }
 
+/// Apart, so that its stack is no burden to who has a deep tree.
+#[inline(never)]
+fn search_short<const ANY: bool>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+    search::<ANY, SHORT>(bvh, ray)
+}
+
 /// Apart, so that only who has a deep tree pays for the long stack.
 #[inline(never)]
-fn deep<const ANY: bool>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
+pub(super) fn search_deep<const ANY: bool>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
     search::<ANY, STACK>(bvh, ray)
 }
 

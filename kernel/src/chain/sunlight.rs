@@ -103,7 +103,7 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn add_images(
         &self,
-        leg: &Leg<'_>,
+        leg: &mut Leg<'_>,
         surface: &Surface,
         sample: Sample,
         to: &mut [f64; MAX_BANDS],
@@ -120,11 +120,12 @@ impl Solved<'_> {
                 continue;
             }
             let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
-            let (mut lit, mut products) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
+            let [lit, products] = &mut *leg.images;
+            lit.head_mut(bands).fill(0.0);
             let all = self.over_disc(&image, at_stake, surface, sample, path, |path, toward, share| {
-                let seen = self.mirrored_sun(sun, surface, (toward, axis), most, &mut products, path);
+                let seen = self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
                 if seen {
-                    lit.iter_mut().zip(&products).take(bands).for_each(|(sum, p)| *sum += share * p);
+                    lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
                 }
                 seen
             });
