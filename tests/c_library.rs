@@ -85,11 +85,13 @@ fn c_programs_run_as_every_standard() {
 
 #[test]
 fn cpp_programs_run_as_every_standard() {
-    let source = root().join("tests/c/interface.cpp");
-    for compiler in ["c++", "clang++"] {
-        for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
-            let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
-            assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
+    for program in ["interface.cpp", "owners.cpp"] {
+        let source = root().join("tests/c").join(program);
+        for compiler in ["c++", "clang++"] {
+            for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
+                let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
+                assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
+            }
         }
     }
 }

@@ -2,10 +2,14 @@
  * Blik without heap and operating system: a small craft from its facets to its image, and the same from a block that a
  * workstation baked. Everything stands in one static array; `board.h` is all that it needs of the machine.
  *
- * Compiled with RENDER_ONLY it reads the baked block alone. What it prints are checksums of the bits of its results:
- * they are the same on every machine.
+ * Compiled with RENDER_ONLY it reads the baked block alone and lights it anew; with RENDER_SOLVED it shows it under the
+ * light that was baked with it. What it prints are checksums of the bits of its results: they are the same on every
+ * machine.
  */
 #include "board.h"
+#ifdef RENDER_SOLVED
+#define RENDER_ONLY
+#endif
 
 #include <blik.h>
 #ifndef RENDER_ONLY
@@ -69,6 +73,7 @@ static uint32_t checksum(const void *data, size_t bytes)
     return sum;
 }
 
+#ifndef RENDER_SOLVED
 static void light(const blik_coupling *coupling, double toward, const blik_solution **solution)
 {
     blik_error error;
@@ -90,6 +95,7 @@ static void light(const blik_coupling *coupling, double toward, const blik_solut
     place = take(bytes);
     require(blik_solution_init(coupling, &light, NULL, place, bytes, &error, solution));
 }
+#endif
 
 static void show(const char *what, const blik_solution *solution)
 {
@@ -127,6 +133,21 @@ static void picture(void)
     }
 }
 
+/* What two distant observers measure. */
+static void signatures(const blik_solution *solution)
+{
+    static const double directions[2][3] = {{-4, 6, -5}, {1, 0, -1}};
+    blik_error error;
+    blik_signature measured[2];
+    size_t bytes = 0, before = used;
+    void *scratch;
+    require(blik_radiance_scratch_size(solution, NULL, &error, &bytes));
+    scratch = take(bytes);
+    require(blik_signatures(solution, directions[0], 2, 0, NULL, scratch, bytes, &error, measured));
+    used = before;
+    say("signatures", checksum(measured, sizeof measured), "\n");
+}
+
 /* From facets to a coupling, to an image, to a block; its size in `bytes`. */
 static const void *compute(size_t *bytes)
 {
@@ -139,7 +160,6 @@ static const void *compute(size_t *bytes)
     const blik_coupling *coupling = NULL;
     const blik_solution *solution = NULL;
     void *place;
-    size_t before;
     materials[0].diffuse = &grey;
     materials[1].diffuse = &dark;
     materials[1].specular = &shine;
@@ -175,22 +195,21 @@ static const void *compute(size_t *bytes)
         used -= (*bytes - info.bytes) / 64 * 64;
         say("coupling", (uint32_t)info.pairs, " form factors\n");
     }
-    require(blik_bake_size(coupling, NULL, &error, bytes));
-    place = take(*bytes);
-    require(blik_bake(coupling, NULL, place, *bytes, &error));
-    say("block of", (uint32_t)*bytes, " bytes\n");
-    say("block", checksum(place, *bytes), "\n");
-    before = used;
     light(coupling, 1, &solution);
     say("computed in", (uint32_t)used, " bytes\n");
     show("image", solution);
     picture();
-    used = before;
+    signatures(solution);
+    require(blik_bake_size(coupling, solution, &error, bytes));
+    place = take(*bytes);
+    require(blik_bake(coupling, solution, place, *bytes, &error));
+    say("block of", (uint32_t)*bytes, " bytes\n");
+    say("block", checksum(place, *bytes), "\n");
     return place;
 }
 #endif
 
-/* An image from a baked block, under another sun. */
+/* An image from a baked block, under another sun, or under the one that was baked with it. */
 static void render(const char *what, const void *block, size_t size)
 {
     blik_error error;
@@ -202,7 +221,9 @@ static void render(const char *what, const void *block, size_t size)
     require(blik_load_size(block, size, &error, &bytes));
     place = take(bytes);
     require(blik_load(block, size, place, bytes, &error, &scene, &coupling, &solution));
+#ifndef RENDER_SOLVED
     light(coupling, -1, &solution);
+#endif
     say("rendered in", (uint32_t)(used - before), " bytes\n");
     show(what, solution);
     used = before;
