@@ -123,6 +123,10 @@ fn the_examples_do_what_they_say() {
             assert!(values[4] > 2.0 && values[4] < 8.0, "{line}");
         }
     }
+    if knows("c++", "c++17") {
+        let printed = run("c++", "c++17", &examples.join("memory.cpp"), Link::Static, &["0.1"]);
+        assert!(printed.starts_with("1058 facets at 0.1, bytes a facet: scene "), "{printed}");
+    }
     let folder = tempfile::tempdir().unwrap();
     let pictures = ["1", "3"].map(|threads| {
         let file = folder.path().join(threads);
