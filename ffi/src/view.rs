@@ -536,8 +536,8 @@ fn measure(
         signature::rows_in(&solved, &view, at..at + 1, (&mut *terms, &mut *work), &mut row)?;
         row.iter().for_each(|row| sums.add(row));
     }
-    let mut all = [0.0; MAX_BANDS];
-    let (background, _) = all.split_at_mut(out.len().min(MAX_BANDS));
+    terms.clear(out.len());
+    let (background, _) = terms.mirror_sky.split_at_mut(out.len().min(MAX_BANDS));
     if let Some(sky) = &solution.light.sky {
         sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), background);
     }

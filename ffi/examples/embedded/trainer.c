@@ -22,6 +22,15 @@ static _Alignas(64) unsigned char memory[MEMORY];
 static size_t used;
 static float pixels[COLUMNS * ROWS];
 
+/* Where the stack ends of who calls the library: beyond is the library's. */
+static volatile uintptr_t caller;
+
+__attribute__((noinline)) static void note(void)
+{
+    unsigned char here;
+    caller = (uintptr_t)&here;
+}
+
 static void *take(size_t bytes)
 {
     void *place = memory + used;
@@ -160,6 +169,7 @@ static const void *compute(size_t *bytes)
     const blik_coupling *coupling = NULL;
     const blik_solution *solution = NULL;
     void *place;
+    note();
     materials[0].diffuse = &grey;
     materials[1].diffuse = &dark;
     materials[1].specular = &shine;
@@ -218,6 +228,9 @@ static void render(const char *what, const void *block, size_t size)
     const blik_solution *solution = NULL;
     size_t bytes = 0, before = used;
     void *place;
+#ifdef RENDER_ONLY
+    note();
+#endif
     require(blik_load_size(block, size, &error, &bytes));
     place = take(bytes);
     require(blik_load(block, size, place, bytes, &error, &scene, &coupling, &solution));
@@ -229,7 +242,8 @@ static void render(const char *what, const void *block, size_t size)
     used = before;
 }
 
-/* How deep the stack gets, on machines that tell where theirs ends: what was painted before and is not any more. */
+/* How deep the library's stack gets, on machines that tell where theirs ends: what was painted before and is not any
+ * more. */
 static void stack(int paint)
 {
     unsigned char here;
@@ -247,7 +261,7 @@ static void stack(int paint)
     while (*at == PAINT) {
         ++at;
     }
-    say("stack", (uint32_t)((uintptr_t)&here - (uintptr_t)at), " bytes\n");
+    say("stack", (uint32_t)(caller - (uintptr_t)at), " bytes\n");
 }
 
 static void whole(void)
