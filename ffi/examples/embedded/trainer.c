@@ -22,13 +22,29 @@ static _Alignas(64) unsigned char memory[MEMORY];
 static size_t used;
 static float pixels[COLUMNS * ROWS];
 
-/* Where the stack ends of who calls the library: beyond is the library's. */
-static volatile uintptr_t caller;
+/* The deepest stack of the library, on machines that tell where theirs ends: what was painted below its caller's and is not
+ * any more. To be called by who calls the library next. */
+static uintptr_t caller;
+static size_t deepest;
 
-__attribute__((noinline)) static void note(void)
+__attribute__((noinline)) static void watch_stack(void)
 {
     unsigned char here;
+    unsigned char *at = board_stack;
+    if (at == NULL) {
+        return;
+    }
+    while (caller != 0 && *at == PAINT) {
+        ++at;
+    }
+    if (caller != 0 && caller - (uintptr_t)at > deepest) {
+        deepest = (size_t)(caller - (uintptr_t)at);
+    }
     caller = (uintptr_t)&here;
+    /* what is near `here` is this call's own */
+    for (at = board_stack; (uintptr_t)at + 64 < caller; ++at) {
+        *at = PAINT;
+    }
 }
 
 static void *take(size_t bytes)
@@ -91,6 +107,7 @@ static void light(const blik_coupling *coupling, double toward, const blik_solut
     blik_light light;
     size_t bytes = 0;
     void *place;
+    watch_stack();
     blik_sky_init(&sky);
     sky.model = BLIK_SKY_OVERCAST;
     blik_sun_init(&sun);
@@ -112,6 +129,7 @@ static void show(const char *what, const blik_solution *solution)
     blik_camera camera;
     size_t bytes = 0, before = used;
     void *scratch;
+    watch_stack();
     blik_camera_init(&camera);
     camera.eye[0] = 4;
     camera.eye[1] = -6;
@@ -150,6 +168,7 @@ static void signatures(const blik_solution *solution)
     blik_signature measured[2];
     size_t bytes = 0, before = used;
     void *scratch;
+    watch_stack();
     require(blik_radiance_scratch_size(solution, NULL, &error, &bytes));
     scratch = take(bytes);
     require(blik_signatures(solution, directions[0], 2, 0, NULL, scratch, bytes, &error, measured));
@@ -169,7 +188,7 @@ static const void *compute(size_t *bytes)
     const blik_coupling *coupling = NULL;
     const blik_solution *solution = NULL;
     void *place;
-    note();
+    watch_stack();
     materials[0].diffuse = &grey;
     materials[1].diffuse = &dark;
     materials[1].specular = &shine;
@@ -210,6 +229,7 @@ static const void *compute(size_t *bytes)
     show("image", solution);
     picture();
     signatures(solution);
+    watch_stack();
     require(blik_bake_size(coupling, solution, &error, bytes));
     place = take(*bytes);
     require(blik_bake(coupling, solution, place, *bytes, &error));
@@ -228,9 +248,7 @@ static void render(const char *what, const void *block, size_t size)
     const blik_solution *solution = NULL;
     size_t bytes = 0, before = used;
     void *place;
-#ifdef RENDER_ONLY
-    note();
-#endif
+    watch_stack();
     require(blik_load_size(block, size, &error, &bytes));
     place = take(bytes);
     require(blik_load(block, size, place, bytes, &error, &scene, &coupling, &solution));
@@ -240,28 +258,6 @@ static void render(const char *what, const void *block, size_t size)
     say("rendered in", (uint32_t)(used - before), " bytes\n");
     show(what, solution);
     used = before;
-}
-
-/* How deep the library's stack gets, on machines that tell where theirs ends: what was painted before and is not any
- * more. */
-static void stack(int paint)
-{
-    unsigned char here;
-    unsigned char *at = board_stack;
-    if (at == NULL) {
-        return;
-    }
-    if (paint) {
-        /* what is near `here` is this call's own */
-        while ((uintptr_t)at + 256 < (uintptr_t)&here) {
-            *at++ = PAINT;
-        }
-        return;
-    }
-    while (*at == PAINT) {
-        ++at;
-    }
-    say("stack", (uint32_t)(caller - (uintptr_t)at), " bytes\n");
 }
 
 static void whole(void)
@@ -279,9 +275,11 @@ static void whole(void)
 
 int main(void)
 {
-    stack(1);
     whole();
-    stack(0);
+    watch_stack();
+    if (board_stack != NULL) {
+        say("stack", (uint32_t)deepest, " bytes\n");
+    }
     board_print("done\n");
     board_end(0);
     return 0;
