@@ -74,7 +74,7 @@ impl Sums {
     /// Adds the next row.
     pub fn add(&mut self, next: &Sums) {
         self.area += next.area;
-        self.intensity.iter_mut().zip(next.intensity).for_each(|(a, b)| *a += b);
+        self.intensity.iter_mut().zip(&next.intensity).for_each(|(a, b)| *a += b);
         self.rays += next.rays;
     }
 }
