@@ -11,11 +11,11 @@ use blik_kernel::Error;
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
 use blik_kernel::chain::{Sample, Terms, Work};
-use blik_kernel::image::{self, Tally, Target};
+use blik_kernel::image::{self, Tally, Target, piece};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::{MAX_BANDS, Scene};
-use blik_kernel::signature::{self, Signature, Sums, View};
+use blik_kernel::signature::{self, Signature, View};
 use blik_kernel::{facets, policy};
 use core::ffi::c_void;
 use core::ops::Range;
@@ -103,11 +103,6 @@ unsafe fn camera(camera: *const blik_camera, scene: &Scene<'_>) -> Result<Camera
     let (eye, target, up) = (camera.eye, camera.target, camera.up);
     let (columns, rows) = (camera.columns, camera.rows);
     Ok(Camera::new(&CameraInput { projection, eye, target, up, columns, rows, sampling }, scene)?)
-}
-
-/// Rows of one piece of an image: the same for any number of threads, so that sums over pixels are the same too.
-fn piece(rows: usize) -> usize {
-    rows.div_ceil(128).max(4)
 }
 
 /// Bytes of one lane's scratch memory, and of the tallies before them.
@@ -346,9 +341,10 @@ pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usi
     }
 }
 
-/// Bytes of one lane's scratch memory while rays are followed.
+/// Bytes of one lane's scratch memory while rays are followed, or a signature is found.
 fn lane_bytes() -> Result<usize, blik_error> {
-    Ok(Need::new().and::<Terms>(1).and::<Work>(1).bytes()?.next_multiple_of(ALIGNMENT))
+    let rays = Need::new().and::<Terms>(1).and::<Work>(1).bytes()?;
+    Ok(rays.max(signature::scratch_bytes()?).next_multiple_of(ALIGNMENT))
 }
 
 /// Bytes of scratch memory with which [`blik_radiance`] and [`blik_signatures`] keep all lanes of `run` busy.
@@ -378,7 +374,7 @@ fn follow(
     items: usize,
     scratch: &mut [u8],
     runner: &mut Runner,
-    work: impl Fn(usize, &mut Terms, &mut Work) -> Result<(), blik_error> + Sync,
+    work: impl Fn(usize, &mut [u8]) -> Result<(), blik_error> + Sync,
 ) -> Result<(), blik_error> {
     let (own, given) = (lane_bytes()?, scratch.len());
     let lanes = given / own;
@@ -386,13 +382,9 @@ fn follow(
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(own, given));
     }
     let start = Start(scratch.as_mut_ptr());
-    let short = Error::BufferTooSmall { needed: own, given };
     runner.each(items, lanes.min(runner.lanes()), 1.0, &|lane, item| {
         // SAFETY: a lane's memory is used by that lane alone.
-        let memory = unsafe { core::slice::from_raw_parts_mut(start.at(lane * own), own) };
-        let mut arena = Arena::new(memory, own)?;
-        let (terms, rest) = (arena.take::<Terms>(1)?, arena.take::<Work>(1)?);
-        work(item, terms.first_mut().ok_or(short)?, rest.first_mut().ok_or(short)?)
+        work(item, unsafe { core::slice::from_raw_parts_mut(start.at(lane * own), own) })
     })
 }
 
@@ -428,7 +420,11 @@ pub unsafe extern "C" fn blik_radiance(
         let start = Start(out.as_mut_ptr());
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
-            follow(count.div_ceil(RAYS), given, &mut runner, |item, terms, work| {
+            follow(count.div_ceil(RAYS), given, &mut runner, |item, memory| {
+                let short = Error::BufferTooSmall { needed: lane_bytes()?, given: memory.len() };
+                let mut arena = Arena::new(memory, 0)?;
+                let (terms, work) = (arena.take::<Terms>(1)?, arena.take::<Work>(1)?);
+                let (terms, work) = (terms.first_mut().ok_or(short)?, work.first_mut().ok_or(short)?);
                 let first = item * RAYS;
                 let own = rays.iter().skip(first).take(RAYS);
                 // SAFETY: every item is handed out once, and its values lie within the array.
@@ -509,12 +505,12 @@ pub unsafe extern "C" fn blik_signatures(
         let out = Start(out.as_mut_ptr());
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
-            follow(views, given, &mut runner, |view, terms, work| {
+            follow(views, given, &mut runner, |view, memory| {
                 let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
                 let direction = Vec3::from_array(direction.unwrap_or_default());
                 // SAFETY: every view is handed out once, and its entries lie within the array.
                 let out = unsafe { core::slice::from_raw_parts_mut(out.at(view * bands), bands) };
-                measure(solution, direction, cells, (terms, work), out)
+                measure(solution, direction, cells, memory, out)
             })
         };
         // SAFETY: by the caller's promise.
@@ -526,20 +522,15 @@ fn measure(
     solution: &blik_solution,
     forward: Vec3,
     cells: usize,
-    (terms, work): (&mut Terms, &mut Work),
+    scratch: &mut [u8],
     out: &mut [blik_signature],
 ) -> Result<(), blik_error> {
     let solved = solution.solved();
     let view = View::new(&solved, forward, cells)?;
-    let (mut sums, mut row) = (Sums::ZERO, [Sums::ZERO]);
-    for at in 0..view.rows() {
-        signature::rows_in(&solved, &view, at..at + 1, (&mut *terms, &mut *work), &mut row)?;
-        row.iter().for_each(|row| sums.add(row));
-    }
-    terms.clear(out.len());
-    let (background, _) = terms.mirror_sky.split_at_mut(out.len().min(MAX_BANDS));
+    let sums = signature::whole(&solved, &view, &mut *scratch)?;
+    let background = Arena::new(scratch, 0)?.take::<f64>(out.len())?;
     if let Some(sky) = &solution.light.sky {
-        sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), background);
+        sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
     for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
         let own = Signature::new(&sums, band, background);

@@ -13,6 +13,7 @@ mod external;
 mod obvhs;
 mod stream;
 mod traverse;
+mod within;
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
@@ -26,6 +27,7 @@ use external::External;
 
 pub use external::{Ahead, BATCH, Intersector, NO_FACET};
 pub(crate) use stream::GROUP;
+pub(crate) use within::Half;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.
