@@ -521,6 +521,11 @@
 #define BLIK_U32 5
 
 /**
+ * Numbers of blik_array: unsigned, 64 bits.
+ */
+#define BLIK_U64 6
+
+/**
  * "No vertex normal" among the indices of normals.
  */
 #define BLIK_NO_NORMAL 4294967295
@@ -1376,7 +1381,7 @@ typedef struct blik_array {
      */
     size_t stride;
     /**
-     * `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16` or `BLIK_U32`.
+     * `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16`, `BLIK_U32` or `BLIK_U64`.
      */
     int32_t format;
 } blik_array;
@@ -1420,11 +1425,11 @@ typedef struct blik_mesh {
      */
     struct blik_array vertices;
     /**
-     * Three vertex indices (`BLIK_U32` or `BLIK_U16`) a facet, counter-clockwise seen from the front.
+     * Three vertex indices (`BLIK_U8` to `BLIK_U64`) a facet, counter-clockwise seen from the front.
      */
     struct blik_array facets;
     /**
-     * Material of each facet (`BLIK_U32`, `BLIK_U16` or `BLIK_U8`); absent: all 0.
+     * Material of each facet (`BLIK_U8` to `BLIK_U64`); absent: all 0.
      */
     struct blik_array facet_materials;
     /**
@@ -1432,7 +1437,7 @@ typedef struct blik_mesh {
      */
     struct blik_array normals;
     /**
-     * Three normal indices a facet, or `BLIK_NO_NORMAL` (`BLIK_U32`); absent: as `facets`.
+     * Three normal indices a facet (`BLIK_U32` or `BLIK_U64`), all bits set for none; absent: as `facets`.
      */
     struct blik_array facet_normals;
     /**
@@ -1852,7 +1857,7 @@ void blik_intersector_init(struct blik_intersector *intersector);
  *
  * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
  * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
- * Rays come up to 32 at once where none depends on what another meets (the first rays of form factors, of elements and of
+ * Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of form factors, of elements and of
  * pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
  */
 int32_t blik_scene_set_intersector(const struct blik_scene *scene,
@@ -2130,6 +2135,20 @@ int32_t blik_get_report(const struct blik_solution *solution,
                         struct blik_report *report);
 
 /**
+ * Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
+ * number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
+ * of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
+ * better, or has had three rounds. This is what the program `render` and the Rust interface go by; an estimate of up to
+ * one and a half times the error asked for passes.
+ */
+int32_t blik_next_tolerance(const struct blik_report *report,
+                            const struct blik_report *before,
+                            double asked,
+                            uint32_t rounds,
+                            struct blik_error *error,
+                            double *tolerance);
+
+/**
  * Sets the defaults; does nothing with a null pointer.
  */
 void blik_run_init(struct blik_run *run);
@@ -2334,25 +2353,41 @@ int32_t blik_image_rows(const struct blik_solution *solution,
                         struct blik_tally *tally);
 
 /**
+ * Bytes of scratch memory with which blik_radiance and blik_signatures keep all lanes of `run` busy.
+ */
+int32_t blik_radiance_scratch_size(const struct blik_solution *solution,
+                                   const struct blik_run *run,
+                                   struct blik_error *error,
+                                   size_t *bytes);
+
+/**
  * Radiance against each of `count` rays of any origin and direction: `radiance` has one value per band for each.
+ *
+ * `scratch` is memory of blik_radiance_scratch_size bytes, or less, for fewer lanes; with the standard library it
+ * may be null, and is then taken from the heap.
  */
 int32_t blik_radiance(const struct blik_solution *solution,
                       const struct blik_ray *rays,
                       size_t count,
                       const struct blik_run *run,
+                      void *scratch,
+                      size_t scratch_size,
                       struct blik_error *error,
                       double *radiance);
 
 /**
  * What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
  * from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
- * one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`.
+ * one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`. Scratch memory as for
+ * blik_radiance.
  */
 int32_t blik_signatures(const struct blik_solution *solution,
                         const double *directions,
                         size_t views,
                         size_t cells,
                         const struct blik_run *run,
+                        void *scratch,
+                        size_t scratch_size,
                         struct blik_error *error,
                         struct blik_signature *signatures);
 

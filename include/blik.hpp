@@ -24,11 +24,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <exception>
 #include <functional>
 #include <initializer_list>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -49,10 +49,30 @@ private:
     static std::string message(const blik_error &info) {
         std::string text = std::string("blik: ") + blik_status_text(info.status);
         const std::string field = blik_field_text(info.field);
-        if (!field.empty()) {
-            text += " (" + field + ", band " + std::to_string(info.band) + ", value " + std::to_string(info.value) + ")";
+        text += field.empty() ? "" : ": " + field;
+        switch (info.status) {
+        case BLIK_ERROR_MATERIAL:
+        case BLIK_ERROR_RANGE:
+        case BLIK_ERROR_CHOICE:
+        case BLIK_ERROR_VERTEX_INDEX:
+        case BLIK_ERROR_NORMAL_INDEX:
+        case BLIK_ERROR_MATERIAL_INDEX: {
+            char value[32];
+            std::snprintf(value, sizeof value, "%.10g", info.value);
+            text += std::string(", value ") + value + (info.band != 0 ? " in band " + std::to_string(info.band) : "");
         }
-        text += ", index " + std::to_string(info.index);
+        }
+        switch (info.status) {
+        case BLIK_ERROR_VERTEX:
+        case BLIK_ERROR_NORMAL:
+        case BLIK_ERROR_VERTEX_INDEX:
+        case BLIK_ERROR_NORMAL_INDEX:
+        case BLIK_ERROR_MATERIAL_INDEX:
+        case BLIK_ERROR_MATERIAL:
+        case BLIK_ERROR_REFLECTANCE_SUM:
+        case BLIK_ERROR_BODY:
+            text += ", index " + std::to_string(info.index);
+        }
         if (info.needed != 0) {
             text += ", needed " + std::to_string(info.needed) + ", given " + std::to_string(info.given);
         }
@@ -76,10 +96,11 @@ public:
     constexpr view(T *data, std::size_t size) noexcept : data_(data), size_(size) {}
     template <std::size_t N>
     constexpr view(T (&array)[N]) noexcept : data_(array), size_(N) {}
+    /* A temporary lives to the end of the call that it is given to. */
     template <typename C, typename = std::enable_if_t<
                               std::is_convertible_v<decltype(std::declval<C &>().data()), T *> &&
                               !std::is_same_v<std::decay_t<C>, view>>>
-    constexpr view(C &container) noexcept : data_(container.data()), size_(container.size()) {}
+    constexpr view(C &&container) noexcept : data_(container.data()), size_(container.size()) {}
     constexpr T *data() const noexcept { return data_; }
     constexpr std::size_t size() const noexcept { return size_; }
     constexpr bool empty() const noexcept { return size_ == 0; }
@@ -101,9 +122,8 @@ constexpr int32_t format() {
     } else if constexpr (std::is_same_v<T, float>) {
         return BLIK_F32;
     } else {
-        static_assert(std::is_integral_v<T> && (sizeof(T) == 1 || sizeof(T) == 2 || sizeof(T) == 4),
-                      "float, double or 8, 16, 32 bit integers");
-        return sizeof(T) == 1 ? BLIK_U8 : sizeof(T) == 2 ? BLIK_U16 : BLIK_U32;
+        static_assert(std::is_integral_v<T> && sizeof(T) <= 8, "float, double or integers");
+        return sizeof(T) == 1 ? BLIK_U8 : sizeof(T) == 2 ? BLIK_U16 : sizeof(T) == 4 ? BLIK_U32 : BLIK_U64;
     }
 }
 
@@ -121,9 +141,16 @@ template <typename C>
 blik_array array(const C &container, std::size_t width) {
     using entry = std::decay_t<decltype(*container.data())>;
     using number = typename numbers<entry>::type;
-    const std::size_t count = container.size() * (sizeof(entry) / sizeof(number)) / width;
-    return blik_array{container.data(), count, width * sizeof(number), format<number>()};
+    const std::size_t all = container.size() * (sizeof(entry) / sizeof(number));
+    if (all % width != 0) {
+        throw std::invalid_argument("blik: " + std::to_string(all) + " numbers, which is no multiple of " +
+                                    std::to_string(width));
+    }
+    return blik_array{container.data(), all / width, width * sizeof(number), format<number>()};
 }
+
+/* Any layout. */
+inline blik_array array(const blik_array &layout, std::size_t) { return layout; }
 
 inline void run_on_threads(void *, std::size_t count, blik_task task, void *context) noexcept {
     std::vector<std::thread> threads;
@@ -140,6 +167,23 @@ inline void run_on_threads(void *, std::size_t count, blik_task task, void *cont
         thread.join();
     }
 }
+
+/* Scratch memory of the size that `size` tells. */
+class scratch {
+public:
+    template <typename Size>
+    explicit scratch(Size size) {
+        blik_error info{};
+        check(size(&info, &size_), info);
+        memory_.reset(new unsigned char[size_]);
+    }
+    unsigned char *data() const noexcept { return memory_.get(); }
+    std::size_t size() const noexcept { return size_; }
+
+private:
+    std::unique_ptr<unsigned char[]> memory_;
+    std::size_t size_ = 0;
+};
 
 /* Frees a handle and, without the standard library, the memory in which it stands. */
 template <typename H>
@@ -195,6 +239,16 @@ owner<H> in_memory(Size size, Init init) {
 #endif
 
 } // namespace detail
+
+/* Entries that stand `stride` bytes apart in the caller's memory, by the first number of the first of them:
+ *
+ *     struct vertex { float position[3], normal[3], u, v; };
+ *     blik::mesh mesh(blik::strided(vertices[0].position, vertices.size(), sizeof(vertex)), indices);
+ */
+template <typename T>
+blik_array strided(const T *first, std::size_t count, std::size_t stride) {
+    return blik_array{first, count, stride, detail::format<T>()};
+}
 
 /* How long stages run: on the calling thread. */
 inline blik_run alone() {
@@ -330,7 +384,7 @@ inline blik_camera perspective(const std::array<double, 3> &eye, const std::arra
 /* A mesh over arrays of the caller, which are read where a scene is made of it, and materials of its own. */
 class mesh {
 public:
-    /* 3 numbers a vertex, 3 indices a facet: containers of numbers or of std::array of 3. */
+    /* 3 numbers a vertex, 3 indices a facet: containers of numbers or of std::array of 3, or strided(). */
     template <typename V, typename F>
     mesh(const V &vertices, const F &facets, std::size_t bands = 1) {
         blik_mesh_init(&mesh_);
@@ -443,6 +497,7 @@ public:
 
 private:
     friend class loaded;
+    scene() = default;
     explicit scene(const blik_scene *handle) { owner_.handle_ = const_cast<blik_scene *>(handle); }
     detail::owner<blik_scene> owner_;
 };
@@ -475,6 +530,7 @@ public:
 
 private:
     friend class loaded;
+    coupling() = default;
     coupling(const blik_coupling *handle, std::size_t bands) : bands_(bands) {
         owner_.handle_ = const_cast<blik_coupling *>(handle);
     }
@@ -519,27 +575,26 @@ public:
 
     /* The whole image. */
     blik::image image(const blik_camera &camera, const blik_run &run = alone()) const {
+        // refuses a camera of too many pixels
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_image_scratch_size(get(), &camera, &run, e, bytes); });
         blik::image out{camera.columns, camera.rows, bands_, {}, {}};
         out.pixels.resize(camera.columns * camera.rows * bands_);
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_image_scratch_size(get(), &camera, &run, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(blik_image(get(), &camera, &run, scratch.get(), bytes, &info, out.pixels.data(), out.pixels.size(),
-                         nullptr, &out.tally),
+        check(blik_image(get(), &camera, &run, scratch.data(), scratch.size(), &info, out.pixels.data(),
+                         out.pixels.size(), nullptr, &out.tally),
               info);
         return out;
     }
     /* Rows first .. first + rows of it, for schedulers and processes of the caller. */
     blik::image image_rows(const blik_camera &camera, std::size_t first, std::size_t rows) const {
-        blik::image out{camera.columns, rows, bands_, {}, {}};
-        out.pixels.resize(camera.columns * rows * bands_);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_image_scratch_size(get(), &camera, nullptr, e, bytes); });
+        blik::image out{camera.columns, rows <= camera.rows ? rows : 0, bands_, {}, {}};
+        out.pixels.resize(out.columns * out.rows * bands_);
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_image_scratch_size(get(), &camera, nullptr, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(blik_image_rows(get(), &camera, first, rows, scratch.get(), bytes, &info, out.pixels.data(),
-                              out.pixels.size(), nullptr, &out.tally),
+        check(blik_image_rows(get(), &camera, first, rows, scratch.data(), scratch.size(), &info,
+                              out.pixels.data(), out.pixels.size(), nullptr, &out.tally),
               info);
         return out;
     }
@@ -556,14 +611,21 @@ public:
         std::vector<blik_signature> out(directions.size() * bands_);
         blik_error info{};
         const double *first = directions.empty() ? nullptr : directions.data()->data();
-        check(blik_signatures(get(), first, directions.size(), cells, &run, &info, out.data()), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_radiance_scratch_size(get(), &run, e, bytes); });
+        check(blik_signatures(get(), first, directions.size(), cells, &run, scratch.data(), scratch.size(), &info,
+                              out.data()),
+              info);
         return out;
     }
     /* Radiance against each ray, one value per band. */
     std::vector<double> radiance(view<const blik_ray> rays, const blik_run &run = alone()) const {
         std::vector<double> out(rays.size() * bands_);
         blik_error info{};
-        check(blik_radiance(get(), rays.data(), rays.size(), &run, &info, out.data()), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_radiance_scratch_size(get(), &run, e, bytes); });
+        check(blik_radiance(get(), rays.data(), rays.size(), &run, scratch.data(), scratch.size(), &info, out.data()),
+              info);
         return out;
     }
     /* All facets of the scene that it was made of. */
@@ -586,6 +648,7 @@ public:
 
 private:
     friend class loaded;
+    solution() = default;
     solution(const blik_solution *handle, std::size_t bands) : bands_(bands) {
         owner_.handle_ = const_cast<blik_solution *>(handle);
     }
@@ -593,11 +656,45 @@ private:
     std::size_t bands_ = 0;
 };
 
+/* The tolerance to which an image had better be computed again, whose rounds, to have the error `asked`, had these
+ * reports; 0: no more.
+ *
+ *     std::vector<blik_report> rounds;
+ *     for (double tolerance = 2e-3; tolerance != 0; tolerance = blik::next_tolerance(rounds, 2e-3)) {
+ *         const blik::coupling coupling(scene, blik::settings(tolerance));
+ *         const blik::solution solution(coupling, light);
+ *         image = solution.image(camera);
+ *         rounds.push_back(solution.report(image.tally));
+ *     }
+ */
+inline double next_tolerance(view<const blik_report> rounds, double asked) {
+    if (rounds.empty()) {
+        return asked;
+    }
+    const blik_report *last = rounds.end() - 1;
+    blik_error info{};
+    double tolerance = 0.0;
+    check(blik_next_tolerance(last, rounds.size() > 1 ? last - 1 : nullptr, asked, static_cast<uint32_t>(rounds.size()),
+                              &info, &tolerance),
+          info);
+    return tolerance;
+}
+
 /* Scene, coupling and perhaps a solution as one relocatable block, on the boundary that it needs. */
 class block {
 public:
     explicit block(const coupling &coupling) : block(coupling.get(), nullptr) {}
     block(const coupling &coupling, const solution &solution) : block(coupling.get(), solution.get()) {}
+    block(block &&other) noexcept
+        : memory_(std::move(other.memory_)), start_(std::exchange(other.start_, nullptr)),
+          size_(std::exchange(other.size_, 0)) {}
+    block &operator=(block &&other) noexcept {
+        block moved(std::move(other));
+        memory_.swap(moved.memory_);
+        std::swap(start_, moved.start_);
+        std::swap(size_, moved.size_);
+        return *this;
+    }
     const unsigned char *data() const noexcept { return start_; }
     std::size_t size() const noexcept { return size_; }
 
@@ -628,23 +725,31 @@ public:
         const blik_coupling *coupling = nullptr;
         const blik_solution *solution = nullptr;
         check(blik_load(block.data(), block.size(), memory_.get(), bytes, &info, &scene, &coupling, &solution), info);
-        scene_.emplace(blik::scene(scene));
-        const std::size_t bands = scene_->info().bands;
-        coupling_.emplace(blik::coupling(coupling, bands));
-        if (solution != nullptr) {
-            solution_.emplace(blik::solution(solution, bands));
-        }
+        scene_ = blik::scene(scene);
+        const std::size_t bands = scene_.info().bands;
+        coupling_ = blik::coupling(coupling, bands);
+        solution_ = blik::solution(solution, bands);
     }
-    const blik::scene &scene() const noexcept { return *scene_; }
-    const blik::coupling &coupling() const noexcept { return *coupling_; }
+    loaded(loaded &&) noexcept = default;
+    /* The handles end before the memory in which they stand. */
+    loaded &operator=(loaded &&other) noexcept {
+        loaded moved(std::move(other));
+        std::swap(memory_, moved.memory_);
+        std::swap(scene_, moved.scene_);
+        std::swap(coupling_, moved.coupling_);
+        std::swap(solution_, moved.solution_);
+        return *this;
+    }
+    const blik::scene &scene() const noexcept { return scene_; }
+    const blik::coupling &coupling() const noexcept { return coupling_; }
     /* Null where the block has none. */
-    const blik::solution *solution() const noexcept { return solution_ ? &*solution_ : nullptr; }
+    const blik::solution *solution() const noexcept { return solution_.get() != nullptr ? &solution_ : nullptr; }
 
 private:
     std::unique_ptr<unsigned char[]> memory_;
-    std::optional<blik::scene> scene_;
-    std::optional<blik::coupling> coupling_;
-    std::optional<blik::solution> solution_;
+    blik::scene scene_;
+    blik::coupling coupling_;
+    blik::solution solution_;
 };
 
 /* The plane model: circles and polylines in two dimensions.
@@ -910,10 +1015,9 @@ private:
     template <typename F>
     void with_scratch(const blik_run &run, F call) const {
         blik_error info{};
-        std::size_t bytes = 0;
-        check(blik_plane_scratch_size(get(), &run, &info, &bytes), info);
-        const std::unique_ptr<unsigned char[]> scratch(new unsigned char[bytes]);
-        check(call(scratch.get(), bytes, &info), info);
+        const detail::scratch scratch(
+            [&](blik_error *e, std::size_t *bytes) { return blik_plane_scratch_size(get(), &run, e, bytes); });
+        check(call(scratch.data(), scratch.size(), &info), info);
     }
     detail::owner<blik_plane_solution> owner_;
 };

@@ -85,11 +85,13 @@ fn c_programs_run_as_every_standard() {
 
 #[test]
 fn cpp_programs_run_as_every_standard() {
-    let source = root().join("tests/c/interface.cpp");
-    for compiler in ["c++", "clang++"] {
-        for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
-            let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
-            assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
+    for program in ["interface.cpp", "owners.cpp"] {
+        let source = root().join("tests/c").join(program);
+        for compiler in ["c++", "clang++"] {
+            for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
+                let link = if *standard == "c++20" { Link::Shared } else { Link::Static };
+                assert_eq!(run(compiler, standard, &source, link, &[]), "ok\n");
+            }
         }
     }
 }
@@ -120,6 +122,10 @@ fn the_examples_do_what_they_say() {
             assert!(values.len() == 6 && values[3] > 0.05 && values[3] < 20.0, "{line}");
             assert!(values[4] > 2.0 && values[4] < 8.0, "{line}");
         }
+    }
+    if knows("c++", "c++17") {
+        let printed = run("c++", "c++17", &examples.join("memory.cpp"), Link::Static, &["0.1"]);
+        assert!(printed.starts_with("1058 facets at 0.1, bytes a facet: scene "), "{printed}");
     }
     let folder = tempfile::tempdir().unwrap();
     let pictures = ["1", "3"].map(|threads| {

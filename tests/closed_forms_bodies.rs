@@ -6,7 +6,7 @@ mod support;
 
 use blik_kernel::host::Lit;
 use blik_kernel::math::Vec3;
-use blik_kernel::signature::{self, Sums, View};
+use blik_kernel::signature::{self, View};
 use glam::{DVec3, dvec3};
 use kernel::{Soup, solve, solve_soup, within};
 use std::f64::consts::{PI, TAU};
@@ -24,10 +24,8 @@ fn close(what: &str, value: f64, truth: f64, tolerance: f64) {
 fn look(lit: &Lit<'_>, forward: DVec3, cells: usize) -> (f64, f64) {
     let solved = lit.solved();
     let view = View::new(&solved, Vec3::from_array(forward.to_array()), cells).unwrap();
-    let mut rows = vec![Sums::ZERO; cells];
-    signature::rows(&solved, &view, 0..cells, &mut rows).unwrap();
-    let mut sums = Sums::ZERO;
-    rows.iter().for_each(|r| sums.add(r));
+    let mut scratch = vec![0; signature::scratch_bytes().unwrap()];
+    let sums = signature::whole(&solved, &view, &mut scratch).unwrap();
     (sums.intensity[0], sums.area)
 }
 

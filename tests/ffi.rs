@@ -216,7 +216,7 @@ unsafe fn views(
         let (e, l) = (irradiance.as_mut_ptr(), radiance.as_mut_ptr());
         done(blik_facets(solution, 0, facets, &mut error, null_mut(), e, l), &error);
         let s = signatures.as_mut_ptr();
-        done(blik_signatures(solution, forward.as_ptr(), 1, 0, run, &mut error, s), &error);
+        done(blik_signatures(solution, forward.as_ptr(), 1, 0, run, null_mut(), 0, &mut error, s), &error);
         done(blik_get_report(solution, &tally, &mut error, &mut report), &error);
         rows_agree(solution, camera, &pixels, &tally);
     }

@@ -381,7 +381,12 @@ fn outputs_of_the_wrong_size() {
         let view = View::new(&solved, Vec3::Z, 8).unwrap();
         let mut sums = [Sums { area: 7.0, ..Sums::ZERO }; 3];
         let expected = Error::Length { what: "signature rows", expected: 8, given: 3 };
-        is(signature::rows(&solved, &view, 0..8, &mut sums).unwrap_err(), expected, &["signature rows"]);
+        let mut scratch = vec![0; signature::scratch_bytes().unwrap()];
+        let error = signature::rows(&solved, &view, 0..8, &mut scratch, &mut sums).unwrap_err();
+        is(error, expected, &["signature rows"]);
+        let given = scratch.len() - 1;
+        let error = signature::rows(&solved, &view, 0..3, &mut scratch[..given], &mut sums).unwrap_err();
+        is(error, Error::BufferTooSmall { needed: given + 1, given }, &["too small"]);
         assert!(sums.iter().all(|s| s.area == 7.0));
 
         let mut values = [7.0; 5];

@@ -264,9 +264,10 @@ fn light_solution_image_and_signature_refuse_tables_of_the_wrong_size() {
             assert!(matches!(beyond, Err(Error::Range { .. })), "a row that the image does not have");
             assert!(pixels.iter().all(|&p| p == 7.5), "no pixel is written");
             let view = View::new(&solved, camera.forward(), 8).unwrap();
+            let mut scratch = vec![0; signature::scratch_bytes().unwrap()];
             for given in [7, 9] {
                 let mut sums = vec![Sums { area: -1.0, ..Sums::ZERO }; given];
-                let refused = signature::rows(&solved, &view, 0..8, &mut sums);
+                let refused = signature::rows(&solved, &view, 0..8, &mut scratch, &mut sums);
                 assert!(matches!(refused, Err(Error::Length { expected: 8, .. })), "{refused:?}");
                 assert!(sums.iter().all(|s| s.area == -1.0), "nothing is written");
             }

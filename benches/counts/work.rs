@@ -36,6 +36,7 @@ pub fn run() {
     counted_signature(&host, &lit);
     counted_setup();
     counted_relight(&values, &host, &geometry);
+    crate::c::run(&case, PIXELS, counted_setup);
     let case = Case { bands: 16, settings: coarse(), ..Case::new(bowl(4), 0.3, 0.1) };
     counted_setup();
     counted_bands(&case, &host);

@@ -141,13 +141,12 @@ fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     let large = CameraInput { columns: 512, rows: 512, ..turned };
     let view =
         |camera: &CameraInput| median(runs, || host.image(&lit, camera, false).map(drop).map_err(Into::into));
-    let curve = || -> Result<(), Box<dyn Error>> {
-        for i in 0..1000 {
-            let angle = std::f64::consts::TAU * f64::from(i) / 1000.0;
-            host.signature(&lit, Vec3::new(angle.cos(), angle.sin(), -0.7))?;
-        }
-        Ok(())
+    let direction = |i: u32| {
+        let angle = std::f64::consts::TAU * f64::from(i) / 1000.0;
+        Vec3::new(angle.cos(), angle.sin(), -0.7)
     };
+    let directions: Vec<Vec3> = (0..1000).map(direction).collect();
+    let curve = || host.signatures(&lit, &directions).map(drop).map_err(Into::into);
     let all = Settings { all_irradiances: true, ..settings(tolerance, true) };
     let geometry = scene.geometry(host, &all, &mut directed)?;
     let sky = |model| SkyInput { model, radiance: &[1.0], ground: &[0.1], up: [0.0, 0.0, 1.0] };

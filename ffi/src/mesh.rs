@@ -22,7 +22,7 @@ fn check(array: &mut blik_array, numbers: usize, formats: &[i32]) -> Result<(), 
         return Err(blik_error::of(BLIK_ERROR_NULL));
     }
     let size = match array.format {
-        BLIK_F64 => 8,
+        BLIK_F64 | BLIK_U64 => 8,
         BLIK_U8 => 1,
         BLIK_U16 => 2,
         _ => 4,
@@ -47,10 +47,11 @@ impl Reader {
         let mut mesh = unsafe { read(mesh) }?;
         let reals = [BLIK_F64, BLIK_F32];
         check(&mut mesh.vertices, 3, &reals)?;
-        check(&mut mesh.facets, 3, &[BLIK_U32, BLIK_U16])?;
-        check(&mut mesh.facet_materials, 1, &[BLIK_U32, BLIK_U16, BLIK_U8])?;
+        let integers = [BLIK_U32, BLIK_U16, BLIK_U8, BLIK_U64];
+        check(&mut mesh.facets, 3, &integers)?;
+        check(&mut mesh.facet_materials, 1, &integers)?;
         check(&mut mesh.normals, 3, &reals)?;
-        check(&mut mesh.facet_normals, 3, &[BLIK_U32])?;
+        check(&mut mesh.facet_normals, 3, &[BLIK_U32, BLIK_U64])?;
         if mesh.material_count > 0 && mesh.materials.is_null() {
             return Err(blik_error::of(BLIK_ERROR_NULL));
         }
@@ -102,6 +103,11 @@ impl Reader {
         match array.format {
             BLIK_U8 => u32::from(Reader::number::<u8>(array, index, at)),
             BLIK_U16 => u32::from(Reader::number::<u16>(array, index, at)),
+            BLIK_U64 => match Reader::number::<u64>(array, index, at) {
+                u64::MAX => BLIK_NO_NORMAL,
+                // more than there may be of anything: refused by the kernel
+                number => u32::try_from(number).unwrap_or(BLIK_NO_NORMAL - 1),
+            },
             _ => Reader::number(array, index, at),
         }
     }

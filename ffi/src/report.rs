@@ -5,7 +5,7 @@ use crate::memory::{needed, object};
 use crate::solution::blik_solution;
 use crate::status::*;
 use crate::view::blik_tally;
-use blik_kernel::policy::{self, Limit};
+use blik_kernel::policy::{self, Limit, Round};
 
 /// `limited_by` of [`blik_report`]: the estimate is 0.
 pub const BLIK_LIMIT_NOTHING: i32 = 0;
@@ -110,6 +110,43 @@ pub unsafe extern "C" fn blik_get_report(
         };
         // SAFETY: not null.
         unsafe { to.write(report) };
+        Ok(())
+    })
+}
+
+/// Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
+/// number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
+/// of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
+/// better, or has had three rounds. This is what the program `render` and the Rust interface go by; an estimate of up to
+/// one and a half times the error asked for passes.
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_next_tolerance(
+    report: *const blik_report,
+    before: *const blik_report,
+    asked: f64,
+    rounds: u32,
+    error: *mut blik_error,
+    tolerance: *mut f64,
+) -> i32 {
+    call(error, || {
+        let to = needed(tolerance)?;
+        let last = needed(report.cast_mut())?;
+        policy::check_tolerance(asked)?;
+        let round = |report: &blik_report| Round {
+            tolerance: report.tolerance,
+            estimate: report.error_estimate,
+            by_visibility: report.limited_by == BLIK_LIMIT_VISIBILITY,
+            rays: report.visibility_rays,
+            bytes: report.bytes,
+        };
+        // SAFETY: not null, and valid by the caller's promise.
+        let (last, before) = unsafe { (round(last.as_ref()), before.as_ref().map(round)) };
+        let next = policy::again(asked, &last, before.as_ref(), rounds);
+        // SAFETY: not null.
+        unsafe { to.write(next.unwrap_or(0.0)) };
         Ok(())
     })
 }

@@ -7,6 +7,7 @@ use crate::run::{Runner, blik_run};
 use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
+use blik_kernel::Error;
 use blik_kernel::bvh::{Ahead, Bvh};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
@@ -108,7 +109,10 @@ fn size(mesh: &Reader) -> Result<usize, blik_error> {
     sum.ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).sizes(usize::MAX, 0))
 }
 
-fn build(mesh: &Reader, memory: &'static mut [u8]) -> Result<*mut blik_scene, blik_error> {
+/// One of the kernel's builders of trees: the hits are the same.
+type Builder = fn(&[[Vec3; 3]], &[f64], Isa, &'static mut [u8]) -> Result<Bvh<'static>, Error>;
+
+fn build(mesh: &Reader, builder: Builder, memory: &'static mut [u8]) -> Result<*mut blik_scene, blik_error> {
     let needed = size(mesh)?;
     if memory.len() < needed {
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, memory.len()));
@@ -117,10 +121,6 @@ fn build(mesh: &Reader, memory: &'static mut [u8]) -> Result<*mut blik_scene, bl
     let short = blik_error::of(BLIK_ERROR_INTERNAL);
     let (own, tree) = rest.split_at_mut_checked(Scene::bytes(mesh)?).ok_or(short)?;
     let scene = Scene::new(mesh, own)?;
-    #[cfg(feature = "std")]
-    let builder = Bvh::build_obvhs;
-    #[cfg(not(feature = "std"))]
-    let builder = Bvh::build;
     let bvh = builder(scene.corners(), scene.areas(), Isa::detect(), tree)?;
     // SAFETY: `place` made room for it.
     unsafe { place.write(blik_scene::new(scene, bvh)) };
@@ -165,7 +165,7 @@ pub unsafe extern "C" fn blik_scene_init(
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
         let (mesh, memory) = unsafe { (Reader::new(mesh)?, bytes(memory, size)?) };
-        let made = build(&mesh, memory)?;
+        let made = build(&mesh, Bvh::build, memory)?;
         // SAFETY: not null.
         unsafe { to.write(made) };
         Ok(())
@@ -189,7 +189,7 @@ pub unsafe extern "C" fn blik_scene_create(
         let mesh = unsafe { Reader::new(mesh) }?;
         let mut slab = Slab::new(size(&mesh)?)?;
         // SAFETY: the handle owns the slab, or is never made.
-        let made = build(&mesh, unsafe { slab.bytes_mut() })?;
+        let made = build(&mesh, Bvh::build_obvhs, unsafe { slab.bytes_mut() })?;
         // SAFETY: just made, and not null.
         unsafe {
             (*made).owner = Some(std::boxed::Box::new(Owned(std::vec![slab])));

@@ -15,6 +15,9 @@ pub const BLIK_U16: i32 = 4;
 /// Numbers of [`blik_array`]: unsigned, 32 bits.
 pub const BLIK_U32: i32 = 5;
 
+/// Numbers of [`blik_array`]: unsigned, 64 bits.
+pub const BLIK_U64: i32 = 6;
+
 /// "No vertex normal" among the indices of normals.
 pub const BLIK_NO_NORMAL: u32 = 0xffff_ffff;
 
@@ -29,7 +32,7 @@ pub struct blik_array {
     pub count: usize,
     /// Bytes from one entry to the next; 0: the size of an entry.
     pub stride: usize,
-    /// `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16` or `BLIK_U32`.
+    /// `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16`, `BLIK_U32` or `BLIK_U64`.
     pub format: i32,
 }
 
@@ -61,13 +64,13 @@ pub struct blik_mesh {
     pub struct_size: usize,
     /// Positions: three `BLIK_F64` or `BLIK_F32` each, in any unit and at any offset.
     pub vertices: blik_array,
-    /// Three vertex indices (`BLIK_U32` or `BLIK_U16`) a facet, counter-clockwise seen from the front.
+    /// Three vertex indices (`BLIK_U8` to `BLIK_U64`) a facet, counter-clockwise seen from the front.
     pub facets: blik_array,
-    /// Material of each facet (`BLIK_U32`, `BLIK_U16` or `BLIK_U8`); absent: all 0.
+    /// Material of each facet (`BLIK_U8` to `BLIK_U64`); absent: all 0.
     pub facet_materials: blik_array,
     /// Normals for interpolated mirror directions, three `BLIK_F64` or `BLIK_F32` each; absent: mirrors are flat.
     pub normals: blik_array,
-    /// Three normal indices a facet, or `BLIK_NO_NORMAL` (`BLIK_U32`); absent: as `facets`.
+    /// Three normal indices a facet (`BLIK_U32` or `BLIK_U64`), all bits set for none; absent: as `facets`.
     pub facet_normals: blik_array,
     /// The materials.
     pub materials: *const blik_material,

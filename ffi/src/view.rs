@@ -7,14 +7,15 @@ use crate::scene::blik_ray;
 use crate::solution::blik_solution;
 use crate::status::*;
 use crate::types::*;
-use blik_kernel::arena::ALIGNMENT;
+use blik_kernel::Error;
+use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
-use blik_kernel::chain::{Sample, Terms};
-use blik_kernel::image::{self, Tally, Target};
+use blik_kernel::chain::{Sample, Terms, Work};
+use blik_kernel::image::{self, Tally, Target, piece};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::{MAX_BANDS, Scene};
-use blik_kernel::signature::{self, Signature, Sums, View};
+use blik_kernel::signature::{self, Signature, View};
 use blik_kernel::{facets, policy};
 use core::ffi::c_void;
 use core::ops::Range;
@@ -104,11 +105,6 @@ unsafe fn camera(camera: *const blik_camera, scene: &Scene<'_>) -> Result<Camera
     Ok(Camera::new(&CameraInput { projection, eye, target, up, columns, rows, sampling }, scene)?)
 }
 
-/// Rows of one piece of an image: the same for any number of threads, so that sums over pixels are the same too.
-fn piece(rows: usize) -> usize {
-    rows.div_ceil(128).max(4)
-}
-
 /// Bytes of one lane's scratch memory, and of the tallies before them.
 fn scratch_parts(camera: &Camera, bands: usize) -> Result<(usize, usize), blik_error> {
     let lane = image::scratch_bytes(camera, bands)?.next_multiple_of(ALIGNMENT);
@@ -139,6 +135,28 @@ pub unsafe extern "C" fn blik_image_scratch_size(
         unsafe { to.write(fixed + lane * runner.lanes()) };
         Ok(())
     })
+}
+
+/// Calls `work` with the caller's scratch memory; with `wanted` bytes of the heap's where that is null and there is a
+/// heap.
+///
+/// # Safety
+/// `scratch` is null or memory of `size` bytes.
+unsafe fn with_scratch<R>(
+    scratch: *mut c_void,
+    size: usize,
+    wanted: usize,
+    work: impl FnOnce(&mut [u8]) -> Result<R, blik_error>,
+) -> Result<R, blik_error> {
+    #[cfg(feature = "std")]
+    if scratch.is_null() {
+        let mut own = Slab::new(wanted)?;
+        // SAFETY: the slab lives until `work` has ended.
+        return work(unsafe { own.bytes_mut() });
+    }
+    let _ = wanted;
+    // SAFETY: by the caller's promise.
+    work(unsafe { bytes(scratch, if scratch.is_null() { 0 } else { size }) }?)
 }
 
 /// Where pixels go.
@@ -207,20 +225,11 @@ pub unsafe extern "C" fn blik_image(
         // SAFETY: by the caller's promise.
         let mut out =
             unsafe { Out::new(pixels, count, components, camera.rows() * camera.columns() * bands) }?;
+        let (fixed, lane) = scratch_parts(&camera, bands)?;
+        let wanted = fixed + lane * runner.lanes();
+        let work = |given: &mut [u8]| paint(solution, &camera, &mut out, given, &mut runner);
         // SAFETY: by the caller's promise.
-        let given = unsafe { bytes(scratch, if scratch.is_null() { 0 } else { scratch_size }) }?;
-        #[cfg(feature = "std")]
-        let mut own = None;
-        #[cfg(feature = "std")]
-        let given = if scratch.is_null() {
-            let (fixed, lane) = scratch_parts(&camera, bands)?;
-            let slab: &mut Slab = own.insert(Slab::new(fixed + lane * runner.lanes())?);
-            // SAFETY: the slab lives until the end of this call.
-            unsafe { slab.bytes_mut() }
-        } else {
-            given
-        };
-        let sum = paint(solution, &camera, &mut out, given, &mut runner)?;
+        let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
         if let Ok(to) = needed(tally) {
             // SAFETY: not null.
             unsafe { to.write(blik_tally::new(&sum)) };
@@ -311,20 +320,12 @@ pub unsafe extern "C" fn blik_image_rows(
         let expected = rows * camera.columns() * bands;
         // SAFETY: by the caller's promise.
         let out = unsafe { Out::new(pixels, count, components, expected) }?;
-        // SAFETY: by the caller's promise.
-        let given = unsafe { bytes(scratch, if scratch.is_null() { 0 } else { scratch_size }) }?;
-        #[cfg(feature = "std")]
-        let mut own = None;
-        #[cfg(feature = "std")]
-        let given = if scratch.is_null() {
-            let slab: &mut Slab = own.insert(Slab::new(image::scratch_bytes(&camera, bands)?)?);
-            // SAFETY: the slab lives until the end of this call.
-            unsafe { slab.bytes_mut() }
-        } else {
-            given
-        };
         let mut target = Target { image: out.pixels, components: out.components };
-        let sum = image::rows(&solution.solved(), &camera, range, &mut target, given)?;
+        let wanted = image::scratch_bytes(&camera, bands)?;
+        let work =
+            |given: &mut [u8]| Ok(image::rows(&solution.solved(), &camera, range, &mut target, given)?);
+        // SAFETY: by the caller's promise.
+        let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
         if let Ok(to) = needed(tally) {
             // SAFETY: not null.
             unsafe { to.write(blik_tally::new(&sum)) };
@@ -340,7 +341,60 @@ pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usi
     }
 }
 
+/// Bytes of one lane's scratch memory while rays are followed, or a signature is found.
+fn lane_bytes() -> Result<usize, blik_error> {
+    let rays = Need::new().and::<Terms>(1).and::<Work>(1).bytes()?;
+    Ok(rays.max(signature::scratch_bytes()?).next_multiple_of(ALIGNMENT))
+}
+
+/// Bytes of scratch memory with which [`blik_radiance`] and [`blik_signatures`] keep all lanes of `run` busy.
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_radiance_scratch_size(
+    solution: *const blik_solution,
+    run: *const blik_run,
+    error: *mut blik_error,
+    bytes: *mut usize,
+) -> i32 {
+    call(error, || {
+        let to = needed(bytes)?;
+        // SAFETY: by the caller's promise.
+        let runner = unsafe { object(solution).and(Runner::new(run)) }?;
+        let size = lane_bytes()? * runner.lanes();
+        // SAFETY: not null.
+        unsafe { to.write(size) };
+        Ok(())
+    })
+}
+
+/// Calls `work` for all `items` with the scratch memory of their lanes, as many lanes as that has room for.
+fn follow(
+    items: usize,
+    scratch: &mut [u8],
+    runner: &mut Runner,
+    work: impl Fn(usize, &mut [u8]) -> Result<(), blik_error> + Sync,
+) -> Result<(), blik_error> {
+    let (own, given) = (lane_bytes()?, scratch.len());
+    let lanes = given / own;
+    if lanes == 0 {
+        return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(own, given));
+    }
+    let start = Start(scratch.as_mut_ptr());
+    runner.each(items, lanes.min(runner.lanes()), 1.0, &|lane, item| {
+        // SAFETY: a lane's memory is used by that lane alone.
+        work(item, unsafe { core::slice::from_raw_parts_mut(start.at(lane * own), own) })
+    })
+}
+
+/// Rays of one piece.
+const RAYS: usize = 256;
+
 /// Radiance against each of `count` rays of any origin and direction: `radiance` has one value per band for each.
+///
+/// `scratch` is memory of [`blik_radiance_scratch_size`] bytes, or less, for fewer lanes; with the standard library it
+/// may be null, and is then taken from the heap.
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -350,6 +404,8 @@ pub unsafe extern "C" fn blik_radiance(
     rays: *const blik_ray,
     count: usize,
     run: *const blik_run,
+    scratch: *mut c_void,
+    scratch_size: usize,
     error: *mut blik_error,
     radiance: *mut f64,
 ) -> i32 {
@@ -361,23 +417,36 @@ pub unsafe extern "C" fn blik_radiance(
         // SAFETY: by the caller's promise.
         let (rays, out) = unsafe { (input(rays, count)?, output(radiance, all)?) };
         let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
-        runner.rows(out, bands, 1.0, |range, out| {
-            let mut terms = Terms::ZERO;
-            let own = (range.start..).zip(rays.iter().skip(range.start));
-            for (n, (index, ray)) in own.enumerate() {
-                let Some(out) = out.get_mut(n * bands..(n + 1) * bands) else { break };
-                terms.clear(bands);
-                let ray = Ray {
-                    origin: scene.to_scene(Vec3::from_array(ray.origin)),
-                    direction: Vec3::from_array(ray.direction),
-                    t_max: ray.t_max * scene.scale(),
-                    skip: ray.skip,
-                };
-                solved.radiance(&ray, Sample::Alone(index as u32), &mut terms);
-                out.iter_mut().enumerate().for_each(|(band, l)| *l = terms.sum(band));
-            }
-            Ok(())
-        })
+        let start = Start(out.as_mut_ptr());
+        let wanted = lane_bytes()? * runner.lanes();
+        let work = |given: &mut [u8]| {
+            follow(count.div_ceil(RAYS), given, &mut runner, |item, memory| {
+                let short = Error::BufferTooSmall { needed: lane_bytes()?, given: memory.len() };
+                let mut arena = Arena::new(memory, 0)?;
+                let (terms, work) = (arena.take::<Terms>(1)?, arena.take::<Work>(1)?);
+                let (terms, work) = (terms.first_mut().ok_or(short)?, work.first_mut().ok_or(short)?);
+                let first = item * RAYS;
+                let own = rays.iter().skip(first).take(RAYS);
+                // SAFETY: every item is handed out once, and its values lie within the array.
+                let out =
+                    unsafe { core::slice::from_raw_parts_mut(start.at(first * bands), own.len() * bands) };
+                for ((index, ray), out) in (first..).zip(own).zip(out.chunks_exact_mut(bands.max(1))) {
+                    let ray = Ray {
+                        origin: scene.to_scene(Vec3::from_array(ray.origin)),
+                        direction: Vec3::from_array(ray.direction),
+                        t_max: ray.t_max * scene.scale(),
+                        skip: ray.skip,
+                    };
+                    terms.clear(bands);
+                    let hit = solution.coupling.base.bvh.closest(&ray);
+                    solved.radiance_at((&ray, hit), Sample::Alone(index as u32), terms, work);
+                    out.iter_mut().enumerate().for_each(|(band, l)| *l = terms.sum(band));
+                }
+                Ok(())
+            })
+        };
+        // SAFETY: by the caller's promise.
+        unsafe { with_scratch(scratch, scratch_size, wanted, work) }
     })
 }
 
@@ -402,7 +471,8 @@ const MOST_CELLS: usize = 65536;
 
 /// What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
 /// from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
-/// one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`.
+/// one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`. Scratch memory as for
+/// [`blik_radiance`].
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -413,6 +483,8 @@ pub unsafe extern "C" fn blik_signatures(
     views: usize,
     cells: usize,
     run: *const blik_run,
+    scratch: *mut c_void,
+    scratch_size: usize,
     error: *mut blik_error,
     signatures: *mut blik_signature,
 ) -> i32 {
@@ -431,13 +503,18 @@ pub unsafe extern "C" fn blik_signatures(
             return Err(too_many.sizes(MOST_CELLS, cells));
         }
         let out = Start(out.as_mut_ptr());
-        let lanes = runner.lanes();
-        runner.each(views, lanes, 1.0, &|_, view| {
-            let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
-            // SAFETY: every view is handed out once, and its entries lie within the array.
-            let out = unsafe { core::slice::from_raw_parts_mut(out.at(view * bands), bands) };
-            measure(solution, Vec3::from_array(direction.unwrap_or_default()), cells, out)
-        })
+        let wanted = lane_bytes()? * runner.lanes();
+        let work = |given: &mut [u8]| {
+            follow(views, given, &mut runner, |view, memory| {
+                let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
+                let direction = Vec3::from_array(direction.unwrap_or_default());
+                // SAFETY: every view is handed out once, and its entries lie within the array.
+                let out = unsafe { core::slice::from_raw_parts_mut(out.at(view * bands), bands) };
+                measure(solution, direction, cells, memory, out)
+            })
+        };
+        // SAFETY: by the caller's promise.
+        unsafe { with_scratch(scratch, scratch_size, wanted, work) }
     })
 }
 
@@ -445,19 +522,15 @@ fn measure(
     solution: &blik_solution,
     forward: Vec3,
     cells: usize,
+    scratch: &mut [u8],
     out: &mut [blik_signature],
 ) -> Result<(), blik_error> {
     let solved = solution.solved();
     let view = View::new(&solved, forward, cells)?;
-    let (mut sums, mut row) = (Sums::ZERO, [Sums::ZERO]);
-    for at in 0..view.rows() {
-        signature::rows(&solved, &view, at..at + 1, &mut row)?;
-        row.iter().for_each(|row| sums.add(row));
-    }
-    let mut all = [0.0; MAX_BANDS];
-    let (background, _) = all.split_at_mut(out.len().min(MAX_BANDS));
+    let sums = signature::whole(&solved, &view, &mut *scratch)?;
+    let background = Arena::new(scratch, 0)?.take::<f64>(out.len())?;
     if let Some(sky) = &solution.light.sky {
-        sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), background);
+        sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
     for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
         let own = Signature::new(&sums, band, background);

@@ -13,6 +13,7 @@ mod external;
 mod obvhs;
 mod stream;
 mod traverse;
+mod within;
 
 use crate::arena::{Arena, Need};
 use crate::error::Error;
@@ -26,6 +27,7 @@ use external::External;
 
 pub use external::{Ahead, BATCH, Intersector, NO_FACET};
 pub(crate) use stream::GROUP;
+pub(crate) use within::Half;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.
@@ -50,8 +52,11 @@ const NONE: u32 = u32::MAX;
 /// Facets a leaf holds at most, and the width of a packet.
 const LANES: usize = 8;
 
-/// Entries of a stack that the deepest tree needs: seven for each of at most 69 levels, and one.
-const STACK: usize = 512;
+/// Levels of the deepest tree.
+const MOST_LEVELS: usize = 32;
+
+/// Entries of a stack that the deepest tree needs: seven for each level, and one.
+const STACK: usize = MOST_LEVELS * 7 + 1;
 
 /// Facet count is kept below this, so that lane and node numbers fit beside the bits of a child.
 const MOST: usize = 1 << 28;

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Field};
 use crate::math::{FRAC_PI_2, Vec3, tan, unit};
+use crate::raster::Samples;
 use crate::ray::Ray;
 use crate::scene::Scene;
 
@@ -132,6 +133,22 @@ impl Camera {
             (self.eye, unit(d).unwrap_or(self.forward))
         };
         Ray::new(origin, direction)
+    }
+
+    /// The centres of the pixels, sample j of row i that of pixel (i, j).
+    pub fn samples(&self) -> Samples {
+        let ((x, y), (columns, rows)) = (self.half, (self.columns as f64, self.rows as f64));
+        Samples {
+            eye: self.eye,
+            forward: self.forward,
+            right: self.right,
+            up: self.up,
+            parallel: self.parallel,
+            first: (x / columns - x, y - y / rows),
+            step: (2.0 * x / columns, -2.0 * y / rows),
+            shear: 0.0,
+            turn: 0.0,
+        }
     }
 
     /// Viewing direction of the image's middle.

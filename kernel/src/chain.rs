@@ -1,7 +1,10 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
 
+mod outlook;
 mod sunlight;
+
+pub(crate) use outlook::{Outlook, Way};
 
 use crate::arena::plain_table;
 use crate::bvh::Bvh;
@@ -14,6 +17,7 @@ use crate::qmc::{Sequence, hash2};
 use crate::ray::{Hit, Ray};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::sun_image::SunImages;
+use outlook::Toward;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +80,8 @@ plain_table! {
         pub squares: [f64; MAX_BANDS],
         /// The sums before the latest ray.
         pub before: [f64; MAX_BANDS],
+        /// What an image of the sun brings, and the product of the reflectances on the way to it.
+        pub images: [[f64; MAX_BANDS]; 2],
     }
 }
 
@@ -86,6 +92,7 @@ impl Work {
         sums: Terms::ZERO,
         squares: [0.0; MAX_BANDS],
         before: [0.0; MAX_BANDS],
+        images: [[0.0; MAX_BANDS]; 2],
     };
 }
 
@@ -97,6 +104,11 @@ impl Terms {
     /// Sets the first `bands` values to zero.
     #[inline]
     pub fn clear(&mut self, bands: usize) {
+        if bands == 1 {
+            // three calls of memset otherwise
+            (self.diffuse[0], self.mirror_sky[0], self.mirror_diffuse[0]) = (0.0, 0.0, 0.0);
+            return;
+        }
         self.diffuse.head_mut(bands).fill(0.0);
         self.mirror_sky.head_mut(bands).fill(0.0);
         self.mirror_diffuse.head_mut(bands).fill(0.0);
@@ -199,6 +211,12 @@ impl Sample {
     }
 }
 
+/// How a ray is followed: which one it is, and what is known of what stands before facets.
+struct How<'w, 'm> {
+    sample: Sample,
+    outlook: &'w mut Outlook<'m>,
+}
+
 /// A chain on its way.
 struct Leg<'w> {
     ray: Ray,
@@ -210,6 +228,8 @@ struct Leg<'w> {
     lobes: u32,
     /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
     lobe: bool,
+    /// For the sun's images.
+    images: &'w mut [[f64; MAX_BANDS]; 2],
 }
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
@@ -297,17 +317,29 @@ impl Solved<'_> {
     /// The same of a ray that is known to meet `hit` first, in the caller's memory.
     pub fn radiance_at(
         &self,
-        (ray, hit): (&Ray, Option<Hit>),
+        seen: (&Ray, Option<Hit>),
         sample: Sample,
         terms: &mut Terms,
         work: &mut Work,
     ) -> Path {
+        self.radiance_with(seen, sample, terms, work, &mut Outlook::none())
+    }
+
+    /// The same with what is known of what stands before facets: fewer rays, and the same bits.
+    pub(crate) fn radiance_with(
+        &self,
+        (ray, hit): (&Ray, Option<Hit>),
+        sample: Sample,
+        terms: &mut Terms,
+        work: &mut Work,
+        outlook: &mut Outlook<'_>,
+    ) -> Path {
         let mut path = Path::default();
-        let Work { through: [through, next], sums, squares, before } = work;
+        let Work { through: [through, next], sums, squares, before, images } = work;
         through.head_mut(self.shape.bands).fill(1.0);
-        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false };
+        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
         let mut fan = Fan { terms: sums, path, squares, before, through: next, count: 0 };
-        self.follow(leg, hit, sample, terms, &mut path, Some(&mut fan));
+        self.follow(leg, hit, &mut How { sample, outlook }, terms, &mut path, Some(&mut fan));
         path
     }
 
@@ -317,7 +349,7 @@ impl Solved<'_> {
         &self,
         mut leg: Leg<'_>,
         mut hit: Option<Hit>,
-        sample: Sample,
+        how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
         mut fan: Option<&mut Fan<'_>>,
@@ -329,7 +361,7 @@ impl Solved<'_> {
             };
             path.object |= leg.mirrors == 0;
             let Some(surface) = Surface::of_hit(self.scene, &met) else { return };
-            self.add_diffuse(&leg, &surface, sample, terms, path);
+            self.add_diffuse(&mut leg, &surface, how, terms, path);
             let Some(mirror) = surface.mirror(self.scene) else { return };
             if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
                 return;
@@ -354,6 +386,16 @@ impl Solved<'_> {
                 None => {
                     let direction = surface.mirrored(self.scene, leg.ray.direction);
                     leg.ray = surface.leave(direction);
+                    if leg.mirrors == 1
+                        && how.outlook.is_parallel()
+                        && !self.scene.is_smooth()
+                        && let Some(known) =
+                            how.outlook.before(self, &surface, Toward::Mirror, (direction, 0.0))
+                    {
+                        path.rays += u32::from(!known.is_empty());
+                        hit = self.bvh.closest_among(&leg.ray, known);
+                        continue;
+                    }
                 }
                 Some(_) => {
                     self.add_sun_gloss(&leg, &surface, &mirror, terms);
@@ -361,13 +403,13 @@ impl Solved<'_> {
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
                     if leg.lobes == 1
-                        && (asked || matches!(sample, Sample::Alone(_)))
+                        && (asked || matches!(how.sample, Sample::Alone(_)))
                         && let Some(fan) = fan.take()
                     {
-                        self.branch(&mut leg, (&surface, &mirror), sample, terms, path, fan);
+                        self.branch(&mut leg, (&surface, &mirror), how, terms, path, fan);
                         return;
                     }
-                    let (u, v) = sample.lobe_point(leg.lobes);
+                    let (u, v) = how.sample.lobe_point(leg.lobes);
                     self.turn(&mut leg, &surface, &mirror, u, v);
                 }
             }
@@ -406,7 +448,7 @@ impl Solved<'_> {
         &self,
         leg: &mut Leg<'_>,
         (surface, mirror): (&Surface, &Mirror),
-        sample: Sample,
+        how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
         fan: &mut Fan<'_>,
@@ -424,11 +466,11 @@ impl Solved<'_> {
         fan.squares.head_mut(bands).fill(0.0);
         for set in 0..2 {
             let n = goal.saturating_sub(fan.count);
-            let turn = sample.turn(set);
+            let turn = how.sample.turn(set);
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
                 let ray = surface.leave(direction);
-                self.add_ray(leg, &ray, sample, fan);
+                self.add_ray(leg, &ray, how, fan);
             }
             if asked.is_none() {
                 goal = self.all_rays(fan.spread(self.reference));
@@ -452,16 +494,18 @@ impl Solved<'_> {
     }
 
     /// One more ray of the lobe that `leg` has met, to its end.
-    fn add_ray(&self, leg: &Leg<'_>, ray: &Ray, sample: Sample, fan: &mut Fan<'_>) {
+    fn add_ray(&self, leg: &mut Leg<'_>, ray: &Ray, how: &mut How<'_, '_>, fan: &mut Fan<'_>) {
         let bands = self.shape.bands;
         let Fan { terms, path, squares, before, through, count } = fan;
         before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = terms.sum(b));
         copy(through.head_mut(bands), leg.through.head(bands));
         path.rays += 1;
-        let of = Sample::OneOf { seed: sample.seed(), index: *count };
+        let sample = Sample::OneOf { seed: how.sample.seed(), index: *count };
+        let mut how = How { sample, outlook: &mut *how.outlook };
         let hit = self.bvh.closest(ray);
-        let leg = Leg { ray: *ray, through, mirrors: leg.mirrors, lobes: leg.lobes, lobe: true };
-        self.follow(leg, hit, of, terms, path, None);
+        let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
+        let leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
+        self.follow(leg, hit, &mut how, terms, path, None);
         for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
             let value = terms.sum(b) - before;
             *square += value * value;
@@ -469,7 +513,8 @@ impl Solved<'_> {
         *count += 1;
     }
 
-    /// The chain leaves the object: sky, and the sun's disc.
+    /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.
+    #[inline(never)]
     fn escape(&self, leg: &Leg<'_>, terms: &mut Terms) {
         let bands = self.shape.bands;
         if let Some(sky) = &self.light.sky {
@@ -492,9 +537,9 @@ impl Solved<'_> {
     #[inline]
     fn add_diffuse(
         &self,
-        leg: &Leg<'_>,
+        leg: &mut Leg<'_>,
         surface: &Surface,
-        sample: Sample,
+        how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
     ) {
@@ -517,9 +562,9 @@ impl Solved<'_> {
         let (unknown, (a, b)) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
-        let sunlit = self.sun_cosine(leg, surface, sample, path);
+        let sunlit = self.sun_cosine(leg, surface, how, path);
         if !self.images.slots.is_empty() {
-            self.add_images(leg, surface, sample, to, path);
+            self.add_images(leg, surface, how, to, path);
         }
         let mut weight = 0.0;
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {

@@ -545,10 +545,8 @@ impl Host {
         report.bytes.image = 4 * (size + 3 * part);
         let (signature, rays) = self.signature(lit, camera.forward())?;
         report.signature = signature;
-        // the signature's rays: one toward each cell, the rest in chains
-        let cells = policy::signature_cells(lit.geometry.settings.tolerance).pow(2) as u64;
-        report.rays.primary = tally.primary + cells;
-        report.rays.chain += tally.chain + rays - cells;
+        report.rays.primary = tally.primary + rays;
+        report.rays.chain += tally.chain;
         report.seconds.image = clock.lap();
         report.finish(&tally, columns * rows);
         Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
@@ -563,8 +561,7 @@ impl Host {
         terms: &mut [Vec<f32>; 3],
     ) -> Result<Tally, Error> {
         let (rows, bands) = (camera.rows(), solved.shape.bands);
-        // the same pieces for any number of threads, so that counts and sums over pixels are the same too
-        let piece = rows.div_ceil(128).max(4);
+        let piece = image::piece(rows);
         let chunk = piece * camera.columns() * bands;
         let scratch = image::scratch_bytes(camera, bands)?;
         let mut parts = terms.each_mut().map(|t| t.chunks_mut(chunk));
@@ -574,11 +571,11 @@ impl Host {
             jobs.push((i * piece..((i + 1) * piece).min(rows), Target { image, components }));
         }
         let tallies = self.pool.install(|| {
-            let paint = |(range, mut target): (Range<usize>, Target<'_>)| {
-                let mut memory = Memory::new(scratch);
+            let paint = |memory: &mut Memory, (range, mut target): (Range<usize>, Target<'_>)| {
                 image::rows(solved, camera, range, &mut target, memory.bytes_mut())
             };
-            jobs.into_par_iter().map(paint).collect::<Result<Vec<_>, _>>()
+            let memory = || Memory::new(scratch);
+            jobs.into_par_iter().map_init(memory, paint).collect::<Result<Vec<_>, _>>()
         })?;
         let mut tally = Tally::default();
         tallies.iter().for_each(|t| tally.add(t));
@@ -590,24 +587,32 @@ impl Host {
     /// The background of the contrast is the sky in that direction.
     pub fn signature(&self, lit: &Lit<'_>, forward: Vec3) -> Result<(SignatureReport, u64), Error> {
         let solved = lit.solved();
-        let bands = lit.shape.bands;
-        let view = View::new(&solved, forward, policy::signature_cells(lit.geometry.settings.tolerance))?;
+        let view = lit.view(&solved, forward)?;
         let mut rows = std::vec![Sums::ZERO; view.rows()];
-        self.split(&mut rows, 1, |range, out| signature::rows(&solved, &view, range, out))?;
+        // few pieces: what lies in two of them is drawn twice
+        let piece = rows.len().div_ceil(2 * self.pool.current_num_threads()).max(16);
+        let size = signature::scratch_bytes()?;
+        self.pool.install(|| {
+            rows.par_chunks_mut(piece).enumerate().try_for_each(|(i, out)| {
+                let range = i * piece..i * piece + out.len();
+                signature::rows(&solved, &view, range, Memory::new(size).bytes_mut(), out)
+            })
+        })?;
         let mut sums = Sums::ZERO;
-        rows.iter().for_each(|r| sums.add(r));
-        let mut background = std::vec![0.0; bands];
-        if let Some(sky) = &lit.light.sky {
-            sky.radiance(forward, &mut background);
-        }
-        let of = |band: usize| Signature::new(&sums, band, background[band]);
-        let report = SignatureReport {
-            radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
-            projected_area: sums.area,
-            mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
-            contrast: (0..bands).map(|b| of(b).contrast).collect(),
+        rows.iter().for_each(|row| sums.add(row));
+        Ok(lit.signature(forward, &sums))
+    }
+
+    /// [`Host::signature`] of many observers, each on one thread: the same numbers.
+    pub fn signatures(&self, lit: &Lit<'_>, forward: &[Vec3]) -> Result<Vec<(SignatureReport, u64)>, Error> {
+        let solved = lit.solved();
+        let size = signature::scratch_bytes()?;
+        let measure = |memory: &mut Memory, forward: &Vec3| {
+            let view = lit.view(&solved, *forward)?;
+            let sums = signature::whole(&solved, &view, memory.bytes_mut())?;
+            Ok(lit.signature(*forward, &sums))
         };
-        Ok((report, sums.rays))
+        self.pool.install(|| forward.par_iter().map_init(|| Memory::new(size), measure).collect())
     }
 }
 
@@ -655,6 +660,28 @@ impl Lit<'_> {
             brightest: self.brightest,
             settings: policy::chains(settings.tolerance, settings.max_bounces),
         }
+    }
+
+    /// The cells of a signature along `forward`.
+    fn view(&self, solved: &Solved<'_>, forward: Vec3) -> Result<View, Error> {
+        View::new(solved, forward, policy::signature_cells(self.geometry.settings.tolerance))
+    }
+
+    /// What the sums over all cells of a signature along `forward` say, and their rays.
+    fn signature(&self, forward: Vec3, sums: &Sums) -> (SignatureReport, u64) {
+        let bands = self.shape.bands;
+        let mut background = std::vec![0.0; bands];
+        if let Some(sky) = &self.light.sky {
+            sky.radiance(forward, &mut background);
+        }
+        let of = |band: usize| Signature::new(sums, band, background[band]);
+        let report = SignatureReport {
+            radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
+            projected_area: sums.area,
+            mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
+            contrast: (0..bands).map(|b| of(b).contrast).collect(),
+        };
+        (report, sums.rays)
     }
 
     /// Reference radiance, one value per band.

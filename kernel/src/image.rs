@@ -5,11 +5,13 @@ mod lines;
 use crate::arena::{Arena, Need, plain_table};
 use crate::bvh::Ahead;
 use crate::camera::{Camera, Sampling};
-use crate::chain::{Sample, Solved, Terms, Work};
+use crate::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::error::{Error, Field};
-use crate::index::{Index, IndexMut, copy};
+use crate::index::{Index, IndexMut, copy, pieces};
 use crate::math::{clamp, floor, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
+use crate::raster::{Items, NOTHING, Samples, UNSURE};
+use crate::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
 use lines::{Fineness, Measure, integrate};
@@ -65,11 +67,26 @@ pub struct Target<'o> {
     pub components: [&'o mut [f32]; 3],
 }
 
-/// Bytes of scratch memory for [`rows`]: three rows of pixel centres, and what integrals over a pixel hold.
+/// Bytes of scratch memory for [`rows`]: three rows of pixel centres, what integrals over a pixel hold, and the facets
+/// that some rows of centres meet.
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
-    let centres = 3 * (camera.columns() + 2) * (3 * bands + NOTES);
-    Need::new().and::<f64>(centres).and::<f64>(work(bands)).and::<Board>(1).bytes()
+    let width = camera.columns() + 2;
+    let need = Need::new().and::<f64>(3 * width * (3 * bands + NOTES)).and::<f64>(work(bands));
+    let need = need.and::<Board>(1).and::<Way>(Outlook::ROOM);
+    Items::need(need, width, DRAWN).bytes()
 }
+
+/// Rows of one piece of an image of so many, for who shares them out: few enough to balance, enough to be drawn together;
+/// the same for any number of threads, so that sums over pixels are the same too.
+pub fn piece(rows: usize) -> usize {
+    rows.div_ceil(128).max(DRAWN)
+}
+
+/// Rows that are drawn together.
+const DRAWN: usize = 8;
+
+/// Meshes of more facets than so many times the pixels are not drawn: rays cost less.
+const FACETS: usize = 2;
 
 /// Values of two nested integrals and the result.
 fn work(bands: usize) -> usize {
@@ -156,17 +173,39 @@ pub fn rows(
     let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
     let width = camera.columns() + 2;
     let stride = 3 * bands + NOTES;
-    let lines = arena.take::<f64>(3 * width * stride)?;
+    let area = camera.sampling() == Sampling::Area;
+    let lines = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
     let work = arena.take::<f64>(work(bands))?;
     let board = arena.take::<Board>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let items = Items::new(&mut arena, width, DRAWN)?;
+    let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
+    let last = range.end as isize + isize::from(area);
+    let line = if camera.is_parallel() { Line::new(&camera.ray(0.0, 0.0)) } else { None };
+    let primary = Primary { samples: camera.samples(), items, draws, drawn: 0..0, last, line };
+    let outlook = if solved.bvh.is_own() {
+        Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS)
+    } else {
+        Outlook::none()
+    };
     let tally = Tally::default();
-    let mut painter = Painter { solved, camera, lines, work, width, stride, board, tally };
+    let mut painter =
+        Painter { solved, camera, lines, work, width, stride, board, beside: false, primary, outlook, tally };
+    if camera.is_parallel() {
+        let Board { terms, work, background, .. } = &mut *painter.board;
+        let seen = (&camera.ray(0.0, 0.0), None);
+        solved.radiance_with(seen, Sample::Alone(0), terms, work, &mut painter.outlook);
+        *background = *terms;
+    }
     match camera.sampling() {
         Sampling::Centre => painter.centres(range, target),
         Sampling::Area => painter.areas(range, target),
     }
     Ok(painter.tally)
 }
+
+/// Rays toward the sun of a pixel, some more or less.
+const SUN_RAYS: f64 = 8.0;
 
 /// How far from a pixel's edges its rays stay, in pixels.
 const EDGE: f64 = 1e-6;
@@ -182,6 +221,38 @@ plain_table! {
         pub sums: Terms,
         /// Sums of squares.
         pub squares: [f64; MAX_BANDS],
+        /// What parallel rays see beside the object.
+        pub background: Terms,
+    }
+}
+
+/// What rays through pixel centres meet.
+struct Primary<'m> {
+    samples: Samples,
+    items: Items<'m>,
+    /// Whether facets are drawn, rather than rays traced.
+    draws: bool,
+    /// Rows in the item buffer.
+    drawn: Range<isize>,
+    /// Rows from here on are not needed.
+    last: isize,
+    /// Of parallel rays.
+    line: Option<Line>,
+}
+
+impl Primary<'_> {
+    /// Makes the item buffer hold a row.
+    fn draw(&mut self, solved: &Solved<'_>, row: isize) {
+        if self.draws && !self.drawn.contains(&row) {
+            self.drawn = row..self.last.min(row + DRAWN as isize).max(row + 1);
+            self.items.draw(solved.bvh, &self.samples, self.drawn.clone(), -1);
+        }
+    }
+
+    /// The facet that a pixel's centre shows, as [`Items::facet`] tells.
+    #[inline]
+    fn facet(&self, row: isize, column: isize) -> u32 {
+        if self.draws { self.items.facet(row, column) } else { UNSURE }
     }
 }
 
@@ -194,6 +265,10 @@ struct Painter<'a, 's> {
     width: usize,
     stride: usize,
     board: &'s mut Board,
+    /// Whether the latest pixel's centre shows the background, rather than the board's terms.
+    beside: bool,
+    primary: Primary<'s>,
+    outlook: Outlook<'s>,
     tally: Tally,
 }
 
@@ -201,12 +276,14 @@ impl<'a> Painter<'a, '_> {
     fn centres(&mut self, range: Range<usize>, target: &mut Target<'_>) {
         let columns = self.camera.columns();
         for (i, row) in range.enumerate() {
-            self.line(row as isize, 0..columns as isize);
-            for j in 0..columns {
-                let at = self.slot(row as isize, j as isize);
-                self.note(at);
-                self.write(target, i * columns + j, at);
-            }
+            self.line(row as isize, 0..columns as isize, |this, pixels, path| {
+                this.note(path.object, path.variance + path.noise * path.noise, path.tail);
+                let terms = this.terms();
+                let first = i * columns + pixels.start as usize;
+                put(target, this.solved.shape.bands, first..first + pixels.len(), 1.0, |term, band| {
+                    [&terms.diffuse, &terms.mirror_sky, &terms.mirror_diffuse].map(|t| t.at(band)).at(term)
+                });
+            });
         }
     }
 
@@ -214,15 +291,16 @@ impl<'a> Painter<'a, '_> {
         let columns = self.camera.columns() as isize;
         let (first, last) = (range.start as isize, range.end as isize);
         if first < last {
-            self.line(first - 1, -1..columns + 1);
-            self.line(first, -1..columns + 1);
+            self.line(first - 1, -1..columns + 1, |this, own, path| this.keep(first - 1, own, path));
+            self.line(first, -1..columns + 1, |this, own, path| this.keep(first, own, path));
         }
         for row in first..last {
-            self.line(row + 1, -1..columns + 1);
+            self.line(row + 1, -1..columns + 1, |this, own, path| this.keep(row + 1, own, path));
             let goal = self.goal(row, columns);
             for j in 0..columns {
                 let at = self.slot(row, j);
-                self.note(at);
+                let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(at + self.stride - NOTES + i));
+                self.note(object > 0.0, variance, tail);
                 let index = (row - first) as usize * columns as usize + j as usize;
                 if self.is_flat(at) {
                     self.write(target, index, at);
@@ -273,63 +351,125 @@ impl<'a> Painter<'a, '_> {
     /// Where a pixel's centre stands in the lines.
     #[inline]
     fn slot(&self, row: isize, column: isize) -> usize {
-        (row.rem_euclid(3) as usize * self.width + (column + 1) as usize) * self.stride
+        slot(row, column, self.width, self.stride)
     }
 
-    /// Computes the centres of a row.
-    fn line(&mut self, row: isize, columns: Range<isize>) {
-        let bands = self.solved.shape.bands;
+    /// Computes the centres of a row: `each` finds the terms of each range of pixels on the board, of pixel after pixel or
+    /// many of the background.
+    fn line(
+        &mut self,
+        row: isize,
+        columns: Range<isize>,
+        mut each: impl FnMut(&mut Self, Range<isize>, &Path),
+    ) {
+        self.primary.draw(self.solved, row);
+        self.tally.primary += columns.len() as u64;
         let mut ahead = Ahead::default();
-        let (start, count) = (columns.start, columns.end.saturating_sub(columns.start) as u32);
-        for (n, j) in columns.enumerate() {
-            let ray = self.camera.ray(j as f64 + 0.5, row as f64 + 0.5);
-            let (camera, n) = (&self.camera, n as u32);
-            let any = |m: u32| {
-                if m == n { ray } else { camera.ray((start + m as isize) as f64 + 0.5, row as f64 + 0.5) }
-            };
-            let hit = self.solved.bvh.closest_of(&mut ahead, n, count, any);
-            self.board.terms.clear(bands);
-            let seed = hash2(row as u32, j as u32);
-            let sample = match self.camera.sampling() {
-                Sampling::Centre => Sample::Alone(seed),
-                Sampling::Area => Sample::Glance(seed),
-            };
-            let path =
-                self.solved.radiance_at((&ray, hit), sample, &mut self.board.terms, &mut self.board.work);
-            self.tally.primary += 1;
-            self.tally.chain += u64::from(path.rays);
-            let at = self.slot(row, j);
+        let skips = self.primary.draws && self.camera.is_parallel();
+        let mut j = columns.start;
+        while j < columns.end {
+            if skips {
+                let next = self.primary.items.next(row, j, columns.end);
+                if next > j {
+                    self.beside = true;
+                    each(self, j..next, &Path::default());
+                    j = next;
+                    continue;
+                }
+            }
+            let facet = self.primary.facet(row, j);
+            let ray = self.centre(row, j);
+            let hit = self.first_hit(&mut ahead, &ray, facet, (row, j), &columns);
+            self.beside = false;
+            let path = self.follow(&ray, hit, row, j);
+            each(self, j..j + 1, &path);
+            j += 1;
+        }
+    }
+
+    /// The terms of the latest pixel's centre.
+    #[inline]
+    fn terms(&self) -> &Terms {
+        if self.beside { &self.board.background } else { &self.board.terms }
+    }
+
+    /// The ray through a pixel's centre.
+    #[inline]
+    fn centre(&self, row: isize, column: isize) -> Ray {
+        self.camera.ray(column as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// What the ray through a pixel's centre meets, `facet` for all that is known.
+    #[inline]
+    fn first_hit(
+        &self,
+        ahead: &mut Ahead,
+        ray: &Ray,
+        facet: u32,
+        (row, column): (isize, isize),
+        columns: &Range<isize>,
+    ) -> Option<Hit> {
+        if facet == NOTHING {
+            return None;
+        }
+        if facet != UNSURE
+            && let Some(line) = self.primary.line.or_else(|| Line::new(ray))
+            && let Some(hit) = self.solved.bvh.meet(&line, ray, facet)
+        {
+            return Some(hit);
+        }
+        let number = |j: isize| (j - columns.start) as u32;
+        let any =
+            |n: u32| if n == number(column) { *ray } else { self.centre(row, columns.start + n as isize) };
+        self.solved.bvh.closest_of(ahead, number(column), number(columns.end), any)
+    }
+
+    /// Puts the terms of a pixel's centre on the board.
+    #[inline]
+    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, row: isize, column: isize) -> Path {
+        let seed = hash2(row as u32, column as u32);
+        let sample = match self.camera.sampling() {
+            Sampling::Centre => Sample::Alone(seed),
+            Sampling::Area => Sample::Glance(seed),
+        };
+        let Board { terms, work, .. } = &mut *self.board;
+        terms.clear(self.solved.shape.bands);
+        let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.outlook);
+        self.tally.chain += u64::from(path.rays);
+        path
+    }
+
+    /// Keeps what is on the board as the centres of pixels in the lines.
+    fn keep(&mut self, row: isize, pixels: Range<isize>, path: &Path) {
+        let bands = self.solved.shape.bands;
+        let Board { terms, background, .. } = &*self.board;
+        let terms = if self.beside { background } else { terms };
+        let variance = path.variance + path.noise * path.noise;
+        let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
+        for column in pixels {
+            let at = slot(row, column, self.width, self.stride);
             let slot = self.lines.part_mut(at..at + self.stride);
-            copy(slot.part_mut(0..bands), &self.board.terms.diffuse);
-            copy(slot.part_mut(bands..2 * bands), &self.board.terms.mirror_sky);
-            copy(slot.part_mut(2 * bands..3 * bands), &self.board.terms.mirror_diffuse);
-            let variance = path.variance + path.noise * path.noise;
-            let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
+            copy(slot.part_mut(0..bands), &terms.diffuse);
+            copy(slot.part_mut(bands..2 * bands), &terms.mirror_sky);
+            copy(slot.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
             copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, variance, path.tail, sampled, 0.0]);
         }
     }
 
     /// Counts an object pixel and its expected errors.
-    fn note(&mut self, at: usize) {
-        let notes = at + self.stride - NOTES;
-        let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(notes + i));
-        if object > 0.0 {
+    fn note(&mut self, object: bool, variance: f64, tail: f64) {
+        if object {
             self.tally.object_pixels += 1;
             self.tally.noise2 += variance;
             self.tally.tail = self.tally.tail.max(tail);
         }
     }
 
+    /// Writes a pixel's centre.
     fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
         let bands = self.solved.shape.bands;
         let slot = self.lines.part(at..at + 3 * bands);
-        for band in 0..bands {
-            let sum = slot.at(band) + slot.at(bands + band) + slot.at(2 * bands + band);
-            target.image.set(index * bands + band, sum as f32);
-            for (c, component) in target.components.iter_mut().enumerate().filter(|(_, o)| !o.is_empty()) {
-                component.set(index * bands + band, slot.at(c * bands + band) as f32);
-            }
-        }
+        put(target, bands, index..index + 1, 1.0, |term, band| slot.at(term * bands + band));
     }
 
     /// Largest difference between a pixel's centre and the mean of two opposite neighbours, relative to the reference
@@ -388,7 +528,7 @@ impl<'a> Painter<'a, '_> {
     ) -> Option<f64> {
         let (solved, camera, measure) = (self.solved, self.camera, self.measure());
         let stride = measure.stride();
-        let Painter { work, board, tally, .. } = self;
+        let Painter { work, board, outlook, tally, .. } = self;
         let (terms, chain) = (&mut board.terms, &mut board.work);
         let (outer, rest) = work.split_at_mut_checked(lines::memory(stride))?;
         let (inner, out) = rest.split_at_mut_checked(lines::memory(stride))?;
@@ -410,7 +550,7 @@ impl<'a> Painter<'a, '_> {
                 let ray = camera.ray(column as f64 + x, row as f64 + y);
                 terms.clear(measure.bands);
                 let hit = solved.bvh.closest(&ray);
-                let path = solved.radiance_at((&ray, hit), Sample::Glance(seed), terms, chain);
+                let path = solved.radiance_with((&ray, hit), Sample::Glance(seed), terms, chain, outlook);
                 tally.primary += 1;
                 tally.chain += u64::from(path.rays);
                 let (diffuse, rest) = slot.split_at_mut_checked(measure.bands)?;
@@ -424,28 +564,9 @@ impl<'a> Painter<'a, '_> {
         let places = [0.0, 0.25, 0.5, 0.75, 1.0];
         let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
-        self.put(target, index, 1.0, |this, term, band| {
-            this.work.at(2 * lines::memory(stride) + term * measure.bands + band)
-        });
+        let out = self.work.part(2 * lines::memory(stride)..self.work.len());
+        put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
         Some(LINES * sqrt(error2))
-    }
-
-    /// Writes a pixel's terms, `of` term and band, times `share`.
-    fn put(
-        &self,
-        target: &mut Target<'_>,
-        index: usize,
-        share: f64,
-        of: impl Fn(&Self, usize, usize) -> f64,
-    ) {
-        let bands = self.solved.shape.bands;
-        for band in 0..bands {
-            let terms = [0, 1, 2].map(|term| of(self, term, band));
-            target.image.set(index * bands + band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
-            for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
-                component.set(index * bands + band, (term * share) as f32);
-            }
-        }
     }
 
     /// The mean over a pixel's square of scattered rays, as many as their contrast asks for.
@@ -474,7 +595,8 @@ impl<'a> Painter<'a, '_> {
             let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
             self.board.terms.clear(bands);
             let of = Sample::OneOf { seed, index: n };
-            let path = self.solved.radiance_at((&ray, hit), of, &mut self.board.terms, &mut self.board.work);
+            let Board { terms, work, .. } = &mut *self.board;
+            let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.outlook);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let Board { terms, sums, squares, .. } = &mut *self.board;
@@ -501,11 +623,44 @@ impl<'a> Painter<'a, '_> {
                 }
             }
         }
-        self.put(target, index, 1.0 / f64::from(n), |this, term, band| {
-            let sums = &this.board.sums;
-            let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
+        let sums = &self.board.sums;
+        let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
+        put(target, bands, index..index + 1, 1.0 / f64::from(n), |term, band| {
             all.get(term).map_or(0.0, |values| values.at(band))
         });
         error
+    }
+}
+
+/// See [`Painter::slot`].
+#[inline]
+fn slot(row: isize, column: isize, width: usize, stride: usize) -> usize {
+    (row.rem_euclid(3) as usize * width + (column + 1) as usize) * stride
+}
+
+/// Writes the terms of pixels, `of` term and band, times `share`.
+#[inline]
+fn put(
+    target: &mut Target<'_>,
+    bands: usize,
+    pixels: Range<usize>,
+    share: f64,
+    of: impl Fn(usize, usize) -> f64,
+) {
+    let values = pixels.start * bands..pixels.end * bands;
+    let fill = |out: &mut [f32], band: usize, value: f32| {
+        let out = out.part_mut(values.clone());
+        if bands == 1 {
+            out.fill(value);
+        } else {
+            pieces(out, bands).for_each(|pixel| pixel.set(band, value));
+        }
+    };
+    for band in 0..bands {
+        let terms = [0, 1, 2].map(|term| of(term, band));
+        fill(target.image, band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
+        for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
+            fill(component, band, (term * share) as f32);
+        }
     }
 }

@@ -20,8 +20,8 @@
 //! | light | [`light`] ([`sky`], [`sun`], [`beam`]) | light | coupling, sky, sun → irradiance before diffuse reflection |
 //! | radiosity | [`radiosity`] | light | coupling, irradiance → diffuse radiance and irradiance of all elements |
 //! | chain | [`chain`] | view | a ray → its radiance, the three terms of eq. (11) |
-//! | image | [`image`] ([`camera`]) | view | rays → pixels |
-//! | signature | [`signature`] | view | rays → radiant intensity, projected area, contrast |
+//! | image | [`image`] ([`camera`], [`raster`]) | view | rays → pixels |
+//! | signature | [`signature`] ([`raster`]) | view | rays → radiant intensity, projected area, contrast |
 //! | plane model | [`plane`], all stages in two dimensions | | circles and polylines → image |
 //!
 //! Under all of them: [`error`], [`math`], [`simd`], [`arena`]. Over them: [`policy`], what follows from the
@@ -89,6 +89,7 @@ pub mod qmc;
 pub mod quadrature;
 pub mod quarter;
 pub mod radiosity;
+pub mod raster;
 pub mod ray;
 pub mod scene;
 pub mod signature;

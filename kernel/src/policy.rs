@@ -71,9 +71,9 @@ pub fn chains(tolerance: f64, max_bounces: Option<u32>) -> ChainSettings {
     ChainSettings { cutoff: 0.05 * tolerance, max_bounces, tolerance }
 }
 
-/// Cells along each side of a signature's view: the outline's error, n^-3/2, a quarter of the tolerance.
+/// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.
 pub fn signature_cells(tolerance: f64) -> usize {
-    (pow(0.25 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
+    (pow(0.5 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
 }
 
 /// When the sweeps over a linear system whose weights may be negative end: as soon as the bound on their error is a

@@ -1,29 +1,34 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
 
+use crate::arena::{Arena, Need};
 use crate::bvh::Ahead;
 use crate::camera::Camera;
-use crate::chain::{Sample, Solved, Terms, Work};
+use crate::chain::{Outlook, Sample, Solved, Terms, Way, Work};
 use crate::error::Error;
 use crate::index::Index;
 use crate::math::{Vec3, frame, unit};
-use crate::qmc::{Sequence, hash2};
-use crate::ray::Ray;
+use crate::qmc::Sequence;
+use crate::raster::{Lines, Samples, Span};
+use crate::ray::{Hit, Ray};
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
 
 /// Rays that look at the object's whole projection along one direction, on a square grid of cells.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    corner: Vec3,
-    right: Vec3,
-    up: Vec3,
-    forward: Vec3,
+    samples: Samples,
     cells: usize,
     cell_area: f64,
 }
 
+/// The golden ratio less 1: rows of cells are shifted by its multiples, which fill a cell evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
 impl View {
     /// The view along `forward` (toward the object), on `cells` x `cells` cells.
+    ///
+    /// Each cell has one ray. Those of a row stand a cell apart on a line that rises by one cell, and rows are shifted
+    /// against each other, so that an outline along either axis of the grid cuts cells everywhere between their edges.
     pub fn new(solved: &Solved<'_>, forward: Vec3, cells: usize) -> Result<View, Error> {
         let forward = unit(forward).ok_or(Error::Direction { field: crate::error::Field::Direction })?;
         let (right, up) = frame(forward);
@@ -35,14 +40,18 @@ impl View {
         let size = high - low;
         let cells = cells.max(1);
         let step = 1.0 / cells as f64;
-        Ok(View {
-            corner: right * low.x + up * low.y + forward * (low.z - 1.0),
-            right: right * (size.x * step),
-            up: up * (size.y * step),
+        let samples = Samples {
+            eye: forward * (low.z - 1.0),
             forward,
-            cells,
-            cell_area: size.x * size.y * step * step,
-        })
+            right,
+            up,
+            parallel: true,
+            first: (low.x, low.y),
+            step: (size.x * step, size.y * step),
+            shear: if size.x > 0.0 { size.y * step / size.x } else { 0.0 },
+            turn: GOLDEN,
+        };
+        Ok(View { samples, cells, cell_area: size.x * size.y * step * step })
     }
 
     /// The view of a camera's middle: along its viewing direction.
@@ -74,52 +83,200 @@ impl Sums {
     /// Adds the next row.
     pub fn add(&mut self, next: &Sums) {
         self.area += next.area;
-        self.intensity.iter_mut().zip(next.intensity).for_each(|(a, b)| *a += b);
+        self.intensity.iter_mut().zip(&next.intensity).for_each(|(a, b)| *a += b);
         self.rays += next.rays;
     }
 }
 
-/// The sums over each row of cells in `range`: one ray in each cell, spread over the cells by a low-discrepancy
-/// sequence. Error of the sums over all n^2 cells: about n^-3/2 of the value for the outline, less inside.
-pub fn rows(solved: &Solved<'_>, view: &View, range: Range<usize>, out: &mut [Sums]) -> Result<(), Error> {
+/// Rows that are looked at together; small machines have little memory.
+const TOGETHER: usize = if cfg!(feature = "std") { 8 } else { 1 };
+
+/// Meshes of more facets than so many times the cells are sampled: rays cost less than all facets' ends.
+const FACETS: usize = 2;
+
+/// Facets less far apart on a row, in cells, touch.
+const GAP: f64 = 1e-9;
+
+/// Bytes of scratch memory for [`rows`].
+pub fn scratch_bytes() -> Result<usize, Error> {
+    let need = Need::new().and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
+    Lines::need(need, TOGETHER).bytes()
+}
+
+/// The sums over each row of cells in `range`. Any split into ranges gives the same bits.
+///
+/// On the line through a row the facets that it shows and their ends are found exactly, so that the error of the outline
+/// is that of a sum over n lines; what they show is taken from rays up to a cell apart.
+///
+/// # Errors
+/// [`Error::Length`] for `out` of another length, [`Error::BufferTooSmall`] for less than [`scratch_bytes`].
+pub fn rows(
+    solved: &Solved<'_>,
+    view: &View,
+    range: Range<usize>,
+    scratch: &mut [u8],
+    out: &mut [Sums],
+) -> Result<(), Error> {
     if out.len() != range.len() {
         return Err(Error::Length { what: "signature rows", expected: range.len(), given: out.len() });
     }
-    let bands = solved.shape.bands;
-    let scale = solved.scene.scale();
-    let area = view.cell_area / (scale * scale);
-    let (mut terms, mut work) = (Terms::ZERO, Work::ZERO);
-    for (row, sums) in range.zip(out) {
-        *sums = Sums::ZERO;
-        let sequence = Sequence::new(hash2(row as u32, 0x5160_0000));
-        let mut ahead = Ahead::default();
-        let cell = |column: u32| {
-            let (x, y) = sequence.pair(column & 0xffff, 0);
-            let origin = view.corner + view.right * (f64::from(column) + x) + view.up * (row as f64 + y);
-            Ray::new(origin, view.forward)
-        };
-        let cells = view.cells as u32;
-        for column in 0..cells {
-            let ray = cell(column);
-            let any = |n| if n == column { ray } else { cell(n) };
-            let hit = solved.bvh.closest_of(&mut ahead, column, cells, any);
-            terms.clear(bands);
-            let path = solved.radiance_at(
-                (&ray, hit),
-                Sample::OneOf { seed: row as u32, index: column },
-                &mut terms,
-                &mut work,
-            );
-            sums.rays += 1 + u64::from(path.rays);
-            if path.object {
-                sums.area += area;
-                for (band, i) in sums.intensity.iter_mut().take(bands).enumerate() {
-                    *i += terms.sum(band) * area;
-                }
-            }
+    let mut out = out.iter_mut();
+    each_row(solved, view, range, scratch, |sums| {
+        if let Some(out) = out.next() {
+            *out = *sums;
         }
+    })
+}
+
+/// The sums over all cells: those of all [`rows`], added in their order.
+pub fn whole(solved: &Solved<'_>, view: &View, scratch: &mut [u8]) -> Result<Sums, Error> {
+    let mut all = Sums::ZERO;
+    each_row(solved, view, 0..view.rows(), scratch, |sums| all.add(sums))?;
+    Ok(all)
+}
+
+/// Calls `each` with the sums over row after row.
+fn each_row(
+    solved: &Solved<'_>,
+    view: &View,
+    range: Range<usize>,
+    scratch: &mut [u8],
+    mut each: impl FnMut(&Sums),
+) -> Result<(), Error> {
+    let given = scratch.len();
+    let needed = scratch_bytes()?;
+    let mut arena = Arena::new(scratch, needed)?;
+    let short = Error::BufferTooSmall { needed, given };
+    let terms = arena.take::<Terms>(1)?.first_mut().ok_or(short)?;
+    let work = arena.take::<Work>(1)?.first_mut().ok_or(short)?;
+    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let mut lines = Lines::new(&mut arena, TOGETHER)?;
+    let own = solved.bvh.is_own();
+    let outlook = if own { Outlook::new(ways, true, view.cell_area, 1.0) } else { Outlook::none() };
+    let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
+    let mut tracer = Tracer { solved, view, area, terms, work, outlook };
+    let flat = view.cell_area == 0.0;
+    let samples = !own || flat || solved.scene.facets() / FACETS > view.cells * view.cells;
+    let (mut next, end) = (range.start, range.end);
+    for row in range {
+        let mut sums = Sums::ZERO;
+        if row == next && !samples {
+            next = end.min(row + TOGETHER);
+            lines.find(solved.bvh, &view.samples, view.cells, row as isize..next as isize);
+        }
+        match lines.of(row as isize) {
+            Some(spans) if !samples => tracer.spans(row, spans, &mut sums),
+            _ => tracer.sample(row, &mut sums),
+        }
+        each(&sums);
     }
     Ok(())
+}
+
+struct Tracer<'a> {
+    solved: &'a Solved<'a>,
+    view: &'a View,
+    /// Of a cell, in the caller's square units.
+    area: f64,
+    terms: &'a mut Terms,
+    work: &'a mut Work,
+    outlook: Outlook<'a>,
+}
+
+impl Tracer<'_> {
+    /// Adds one ray in each cell of a row.
+    #[cold]
+    fn sample(&mut self, row: usize, sums: &mut Sums) {
+        let (solved, samples) = (self.solved, &self.view.samples);
+        let (mut ahead, end) = (Ahead::default(), self.view.cells as u32);
+        let shift = samples.shift(row as isize);
+        let ray_of = |column: u32| samples.ray(row as isize, f64::from(column) + shift);
+        for column in 0..end {
+            let ray = ray_of(column);
+            let any = |n| if n == column { ray } else { ray_of(n) };
+            let hit = solved.bvh.closest_of(&mut ahead, column, end, any);
+            self.follow(&ray, hit, (row, column), sums);
+            self.add(if hit.is_some() { 1.0 } else { 0.0 }, sums);
+        }
+    }
+
+    /// Adds what a row shows, piece by piece without gaps: rays a cell apart or less stand for equal parts of each.
+    fn spans(&mut self, row: usize, mut spans: impl Iterator<Item = Span> + Clone, sums: &mut Sums) {
+        // another place within the parts of each row: facets may be as regular as the cells
+        let (place, _) = Sequence::new(0x5160).pair(row as u32, 0);
+        let mut next = spans.next();
+        while let Some(first) = next {
+            let piece = spans.clone();
+            let mut end = first.end;
+            next = spans.next();
+            while let Some(span) = next
+                && span.start <= end + GAP
+            {
+                end = span.end;
+                next = spans.next();
+            }
+            self.piece((row, place), first, piece, end, sums);
+        }
+    }
+
+    /// Adds a piece of a row from the start of the span `first`, which others follow, to `end`.
+    fn piece(
+        &mut self,
+        (row, place): (usize, f64),
+        first: Span,
+        mut others: impl Iterator<Item = Span>,
+        end: f64,
+        sums: &mut Sums,
+    ) {
+        let length = end - first.start;
+        let parts = ceiling(length);
+        let share = length / f64::from(parts);
+        let mut span = first;
+        for part in 0..parts {
+            let at = first.start + share * (f64::from(part) + place);
+            while span.end <= at
+                && let Some(next) = others.next()
+            {
+                span = next;
+            }
+            let ray = self.view.samples.ray(row as isize, at);
+            let solved = self.solved;
+            let hit =
+                solved.bvh.closest_among(&ray, &[span.facet as u32]).or_else(|| solved.bvh.closest(&ray));
+            self.follow(&ray, hit, (row, at as u32), sums);
+            self.add(share, sums);
+        }
+    }
+
+    /// Finds the terms of a ray.
+    #[inline]
+    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, (row, index): (usize, u32), sums: &mut Sums) {
+        self.terms.clear(self.solved.shape.bands);
+        sums.rays += 1;
+        if hit.is_none() {
+            return;
+        }
+        let sample = Sample::OneOf { seed: row as u32, index };
+        let (seen, outlook) = ((ray, hit), &mut self.outlook);
+        let path = self.solved.radiance_with(seen, sample, self.terms, self.work, outlook);
+        sums.rays += u64::from(path.rays);
+    }
+
+    /// Adds what was found last for so many cells.
+    #[inline]
+    fn add(&self, cells: f64, sums: &mut Sums) {
+        let area = cells * self.area;
+        sums.area += area;
+        for (band, i) in sums.intensity.iter_mut().take(self.solved.shape.bands).enumerate() {
+            *i += self.terms.sum(band) * area;
+        }
+    }
+}
+
+/// The whole number at or above a positive one, at least 1.
+fn ceiling(x: f64) -> u32 {
+    let whole = x as u32;
+    whole + u32::from(f64::from(whole) < x || whole == 0)
 }
 
 /// What the sums say of one band.

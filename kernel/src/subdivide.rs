@@ -308,15 +308,18 @@ impl Probe<'_> {
     /// Unevenness of one side of a triangle.
     fn side(&mut self, node: &Node, side: usize, expected: f64) -> f64 {
         let facet = node.facet as usize;
-        let origins = core::array::from_fn(|point| {
+        let normal = self.scene.side_normal(facet, side);
+        // only the points differ: surfaces of their own would burden the stack
+        let points = core::array::from_fn(|point| {
             let (a, b) = middle(point);
             let (u, v) = Path(node.path).out_of(a, b);
-            Surface::new(self.scene, facet, side, u, v)
+            Surface::new(self.scene, facet, side, u, v).point
         });
-        if let Some(even) = self.closed(node, side, &origins) {
+        if let Some(even) = self.closed(node, side, &points) {
             return even;
         }
-        let (x, y) = frame(self.scene.side_normal(facet, side));
+        let from = Surface::new(self.scene, facet, side, 0.0, 0.0);
+        let (x, y) = frame(normal);
         let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000 ^ node.path));
         let (mut sums, mut half, mut backs) = ([0.0; POINTS], [0.0; POINTS], [0u32; POINTS]);
         let (mut index, mut goal) = (0, FEWEST_RAYS.min(self.rays));
@@ -327,7 +330,8 @@ impl Probe<'_> {
                 }
                 let (p, q) = sequence.pair(index, 0);
                 let (dx, dy, dz) = cosine_direction(p, q);
-                self.shoot(&origins, (x * dx + y * dy, dz), &mut sums, &mut backs);
+                let direction = x * dx + y * dy + normal * dz;
+                self.shoot((&from, &points), direction, &mut sums, &mut backs);
                 index += 1;
             }
             let inside = |backs: u32| f64::from(backs) >= INSIDE * f64::from(index);
@@ -344,7 +348,9 @@ impl Probe<'_> {
     }
 
     /// Unevenness without rays, where nothing hides anything and rays would cost more.
-    fn closed(&self, node: &Node, side: usize, origins: &[Surface; POINTS]) -> Option<f64> {
+    // apart: its triangles do not burden the stack of the rays
+    #[inline(never)]
+    fn closed(&self, node: &Node, side: usize, points: &[Vec3; POINTS]) -> Option<f64> {
         let facet = node.facet as usize;
         let normal = self.scene.side_normal(facet, side);
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
@@ -355,7 +361,6 @@ impl Probe<'_> {
         let clear = Clear::whole(self.scene, self.facing, &receiver, MOST_CLOSED)?;
         let mut sums = [1.0; POINTS];
         let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
-        let points = origins.each_ref().map(|origin| origin.point);
         let base = corners[0].dot(normal);
         for other in self.facing.before(facet, side) {
             let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
@@ -367,34 +372,33 @@ impl Probe<'_> {
                 if above && (if other_side == 0 { low >= -FLAT } else { high <= FLAT }) {
                     together.put(&triangle, brightness);
                     if together.count == LANES {
-                        together.take(self.bvh.isa(), &points, normal, &mut sums);
+                        together.take(self.bvh.isa(), points, normal, &mut sums);
                     }
                     continue;
                 }
-                for (sum, point) in sums.iter_mut().zip(points) {
+                for (sum, &point) in sums.iter_mut().zip(points) {
                     if (point - surface.point).dot(surface.normal) > 0.0 {
                         *sum += brightness * point_to_triangle(point, normal, &triangle);
                     }
                 }
             }
         }
-        together.take(self.bvh.isa(), &points, normal, &mut sums);
+        together.take(self.bvh.isa(), points, normal, &mut sums);
         let half = sums.map(|sum| 0.5 * sum);
         Some(residuals(&half, &sums, &[true; POINTS], 0.5).0)
     }
 
-    /// One ray from each point, all along one direction: (in the plane, cosine).
+    /// One ray from each point of the facet side that `from` stands for, all along one direction.
     #[inline]
     fn shoot(
         &mut self,
-        origins: &[Surface; POINTS],
-        (flat, dz): (Vec3, f64),
+        (from, points): (&Surface, &[Vec3; POINTS]),
+        direction: Vec3,
         sums: &mut Sums,
         backs: &mut [u32; POINTS],
     ) {
         let mut ahead = Ahead::default();
-        let leave = |origin: &Surface| origin.leave(flat + origin.normal * dz);
-        let any = |n: u32| leave(origins.get(n as usize).unwrap_or(&origins[0]));
+        let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.leave(direction);
         for ((n, sum), backs) in (0..POINTS as u32).zip(sums).zip(backs) {
             *sum += match self.bvh.closest_of(&mut ahead, n, POINTS as u32, any) {
                 None => 1.0,
@@ -431,6 +435,7 @@ fn middle(point: usize) -> (f64, f64) {
 
 /// Unevenness by the product of both halves' residuals about their best linear functions over the points seen, and the
 /// noise of a half in it. `half` and `all` are sums over the first half's and all rays; a half has `rays` rays.
+#[inline(never)]
 fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64, f64) {
     let count = seen.iter().filter(|s| **s).count() as f64;
     if count == 0.0 {

@@ -32,6 +32,10 @@ const MANY: u64 = u64::MAX;
 /// Suns this close to each other (1 - cosine; 1.4e-7 rad) are one: directions are kept to 2e-9.
 pub const SAME: f64 = 1e-14;
 
+/// Directions of one image by way of different facets are this close together (1 - cosine): some roundings of 2e-9 rad
+/// beyond [`SAME`].
+const SEEN: f64 = 2.0 * SAME;
+
 /// Chains of mirrors end where the product of their reflectances falls below so many tolerances.
 pub const CUTOFF: f64 = 1e-3;
 
@@ -128,6 +132,15 @@ impl<'a> SunImages<'a> {
         let slots = if self.slots.is_empty() { 0 } else { slots(sides) };
         let own: &'a [u64] = self.slots.get(side * slots..(side + 1) * slots).unwrap_or(&[]);
         own.iter().take_while(|p| **p != 0 && **p != MANY).map(|p| unpack(*p))
+    }
+
+    /// Whether one of `sides` sides of facets may see an image in the direction `axis`: where its images are known, one of
+    /// them stands there.
+    pub fn may_show(&self, sides: usize, side: usize, axis: Vec3) -> bool {
+        if self.slots.is_empty() || self.slots.at(side * slots(sides)) == MANY {
+            return true;
+        }
+        self.of(sides, side).any(|own| 1.0 - own.dot(axis) < SEEN)
     }
 
     /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.

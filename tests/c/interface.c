@@ -221,7 +221,7 @@ int main(void)
     {
         static const double down[3] = {0, 0, -1};
         blik_signature signature;
-        REQUIRE(blik_signatures(solution, down, 1, 65537, NULL, &error, &signature) == BLIK_ERROR_TOO_MANY);
+        REQUIRE(blik_signatures(solution, down, 1, 65537, NULL, NULL, 0, &error, &signature) == BLIK_ERROR_TOO_MANY);
         REQUIRE(error.needed == 65536);
         material.emission = (const double *)(const void *)((const char *)&one + 1);
         REQUIRE(blik_scene_size(&mesh, &error, &bytes) == BLIK_ERROR_ALIGNMENT && error.index == 0);

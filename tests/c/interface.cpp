@@ -20,6 +20,13 @@
 static_assert(!std::is_copy_constructible_v<blik::scene> && std::is_nothrow_move_constructible_v<blik::scene>);
 static_assert(!std::is_copy_assignable_v<blik::solution> && std::is_nothrow_move_assignable_v<blik::solution>);
 
+// Most rays that the caller's ray tracer is asked for at once.
+#ifdef BLIK_STD
+constexpr std::size_t batch = 32;
+#else
+constexpr std::size_t batch = 8;
+#endif
+
 int main() {
     const std::vector<std::array<double, 3>> vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {0, 1, 1}};
     const std::array<std::array<uint32_t, 3>, 4> facets = {{{0, 1, 2}, {0, 2, 3}, {0, 3, 5}, {0, 5, 4}}};
@@ -124,12 +131,12 @@ int main() {
         const blik::coupling own(traced, blik::settings(2e-2), blik::threads(2));
         REQUIRE(blik::solution(own, sun).image(camera, blik::threads(2)).pixels == alone.pixels && other.rays > 1000);
         // in batches where the library may
-        REQUIRE(other.most == 32 && other.rays > other.calls && other.shadows > other.shadow_calls);
+        REQUIRE(other.most == batch && other.rays > other.calls && other.shadows > other.shadow_calls);
         std::vector<blik_ray> many(100, rays[0]);
         std::vector<blik_hit> found(100);
         const std::size_t before = other.calls;
         traced.closest_hits(many, found);
-        REQUIRE(found[99].t == 2.0 && other.calls - before <= 10);
+        REQUIRE(found[99].t == 2.0 && other.calls - before <= 320 / batch);
     }
     REQUIRE(blik_scene_set_intersector(scene.get(), nullptr, nullptr) == BLIK_OK);
 

@@ -428,8 +428,9 @@ impl Stage<'_> {
             counts.image.add(&image::rows(&solved, &camera, range, &mut target, scratch)?);
         }
         let view = View::new(&solved, camera.forward(), out.sums.len())?;
+        let scratch = &mut out.scratch[..signature::scratch_bytes()?];
         split(parts, view.rows(), 1, &mut out.sums, |range, out| {
-            signature::rows(&solved, &view, range, out)
+            signature::rows(&solved, &view, range, scratch, out)
         })?;
         let mut sums = Sums::ZERO;
         out.sums.iter().for_each(|row| sums.add(row));

@@ -2,10 +2,14 @@
  * Blik without heap and operating system: a small craft from its facets to its image, and the same from a block that a
  * workstation baked. Everything stands in one static array; `board.h` is all that it needs of the machine.
  *
- * Compiled with RENDER_ONLY it reads the baked block alone. What it prints are checksums of the bits of its results:
- * they are the same on every machine.
+ * Compiled with RENDER_ONLY it reads the baked block alone and lights it anew; with RENDER_SOLVED it shows it under the
+ * light that was baked with it. What it prints are checksums of the bits of its results: they are the same on every
+ * machine.
  */
 #include "board.h"
+#ifdef RENDER_SOLVED
+#define RENDER_ONLY
+#endif
 
 #include <blik.h>
 #ifndef RENDER_ONLY
@@ -17,6 +21,31 @@ enum { COLUMNS = 24, ROWS = 16, MEMORY = 512 * 1024, PAINT = 0x5a };
 static _Alignas(64) unsigned char memory[MEMORY];
 static size_t used;
 static float pixels[COLUMNS * ROWS];
+
+/* The deepest stack of the library, on machines that tell where theirs ends: what was painted below its caller's and is not
+ * any more. To be called by who calls the library next. */
+static uintptr_t caller;
+static size_t deepest;
+
+__attribute__((noinline)) static void watch_stack(void)
+{
+    unsigned char here;
+    unsigned char *at = board_stack;
+    if (at == NULL) {
+        return;
+    }
+    while (caller != 0 && *at == PAINT) {
+        ++at;
+    }
+    if (caller != 0 && caller - (uintptr_t)at > deepest) {
+        deepest = (size_t)(caller - (uintptr_t)at);
+    }
+    caller = (uintptr_t)&here;
+    /* what is near `here` is this call's own */
+    for (at = board_stack; (uintptr_t)at + 64 < caller; ++at) {
+        *at = PAINT;
+    }
+}
 
 static void *take(size_t bytes)
 {
@@ -69,6 +98,7 @@ static uint32_t checksum(const void *data, size_t bytes)
     return sum;
 }
 
+#ifndef RENDER_SOLVED
 static void light(const blik_coupling *coupling, double toward, const blik_solution **solution)
 {
     blik_error error;
@@ -77,6 +107,7 @@ static void light(const blik_coupling *coupling, double toward, const blik_solut
     blik_light light;
     size_t bytes = 0;
     void *place;
+    watch_stack();
     blik_sky_init(&sky);
     sky.model = BLIK_SKY_OVERCAST;
     blik_sun_init(&sun);
@@ -90,6 +121,7 @@ static void light(const blik_coupling *coupling, double toward, const blik_solut
     place = take(bytes);
     require(blik_solution_init(coupling, &light, NULL, place, bytes, &error, solution));
 }
+#endif
 
 static void show(const char *what, const blik_solution *solution)
 {
@@ -97,6 +129,7 @@ static void show(const char *what, const blik_solution *solution)
     blik_camera camera;
     size_t bytes = 0, before = used;
     void *scratch;
+    watch_stack();
     blik_camera_init(&camera);
     camera.eye[0] = 4;
     camera.eye[1] = -6;
@@ -127,6 +160,22 @@ static void picture(void)
     }
 }
 
+/* What two distant observers measure. */
+static void signatures(const blik_solution *solution)
+{
+    static const double directions[2][3] = {{-4, 6, -5}, {1, 0, -1}};
+    blik_error error;
+    blik_signature measured[2];
+    size_t bytes = 0, before = used;
+    void *scratch;
+    watch_stack();
+    require(blik_radiance_scratch_size(solution, NULL, &error, &bytes));
+    scratch = take(bytes);
+    require(blik_signatures(solution, directions[0], 2, 0, NULL, scratch, bytes, &error, measured));
+    used = before;
+    say("signatures", checksum(measured, sizeof measured), "\n");
+}
+
 /* From facets to a coupling, to an image, to a block; its size in `bytes`. */
 static const void *compute(size_t *bytes)
 {
@@ -139,7 +188,7 @@ static const void *compute(size_t *bytes)
     const blik_coupling *coupling = NULL;
     const blik_solution *solution = NULL;
     void *place;
-    size_t before;
+    watch_stack();
     materials[0].diffuse = &grey;
     materials[1].diffuse = &dark;
     materials[1].specular = &shine;
@@ -175,22 +224,22 @@ static const void *compute(size_t *bytes)
         used -= (*bytes - info.bytes) / 64 * 64;
         say("coupling", (uint32_t)info.pairs, " form factors\n");
     }
-    require(blik_bake_size(coupling, NULL, &error, bytes));
-    place = take(*bytes);
-    require(blik_bake(coupling, NULL, place, *bytes, &error));
-    say("block of", (uint32_t)*bytes, " bytes\n");
-    say("block", checksum(place, *bytes), "\n");
-    before = used;
     light(coupling, 1, &solution);
     say("computed in", (uint32_t)used, " bytes\n");
     show("image", solution);
     picture();
-    used = before;
+    signatures(solution);
+    watch_stack();
+    require(blik_bake_size(coupling, solution, &error, bytes));
+    place = take(*bytes);
+    require(blik_bake(coupling, solution, place, *bytes, &error));
+    say("block of", (uint32_t)*bytes, " bytes\n");
+    say("block", checksum(place, *bytes), "\n");
     return place;
 }
 #endif
 
-/* An image from a baked block, under another sun. */
+/* An image from a baked block, under another sun, or under the one that was baked with it. */
 static void render(const char *what, const void *block, size_t size)
 {
     blik_error error;
@@ -199,34 +248,16 @@ static void render(const char *what, const void *block, size_t size)
     const blik_solution *solution = NULL;
     size_t bytes = 0, before = used;
     void *place;
+    watch_stack();
     require(blik_load_size(block, size, &error, &bytes));
     place = take(bytes);
     require(blik_load(block, size, place, bytes, &error, &scene, &coupling, &solution));
+#ifndef RENDER_SOLVED
     light(coupling, -1, &solution);
+#endif
     say("rendered in", (uint32_t)(used - before), " bytes\n");
     show(what, solution);
     used = before;
-}
-
-/* How deep the stack gets, on machines that tell where theirs ends: what was painted before and is not any more. */
-static void stack(int paint)
-{
-    unsigned char here;
-    unsigned char *at = board_stack;
-    if (at == NULL) {
-        return;
-    }
-    if (paint) {
-        /* what is near `here` is this call's own */
-        while ((uintptr_t)at + 256 < (uintptr_t)&here) {
-            *at++ = PAINT;
-        }
-        return;
-    }
-    while (*at == PAINT) {
-        ++at;
-    }
-    say("stack", (uint32_t)((uintptr_t)&here - (uintptr_t)at), " bytes\n");
 }
 
 static void whole(void)
@@ -244,9 +275,11 @@ static void whole(void)
 
 int main(void)
 {
-    stack(1);
     whole();
-    stack(0);
+    watch_stack();
+    if (board_stack != NULL) {
+        say("stack", (uint32_t)deepest, " bytes\n");
+    }
     board_print("done\n");
     board_end(0);
     return 0;

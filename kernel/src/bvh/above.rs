@@ -4,7 +4,8 @@ use super::{Bvh, LEAF, PAIR, STACK};
 use crate::index::Index;
 use crate::math::Vec3;
 
-/// See [`Bvh::rises_above`].
+/// See [`Bvh::rises_above`]. Apart: its stack is no burden to what the caller does next.
+#[inline(never)]
 pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
     let n = normal.to_array();
     let mut stack = [0u32; STACK];

@@ -2,7 +2,7 @@
 //!
 //! This work is based on I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007.
 
-use super::{Boxes, LANES};
+use super::{Boxes, LANES, MOST_LEVELS};
 use crate::arena::{Arena, Need};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
@@ -145,9 +145,6 @@ impl<'s> Binary<'s> {
 /// Bins per axis.
 const BINS: usize = 16;
 
-/// From this level on nodes are halved by count, which bounds the depth by `SAH_LEVELS` + 28.
-const SAH_LEVELS: usize = 40;
-
 /// Builds the tree, level by level: nodes not yet split are leaves, and the array of nodes is the queue.
 pub(super) fn binned(facets: &Facets, tree: &mut Binary) {
     if tree.order.is_empty() {
@@ -163,7 +160,10 @@ pub(super) fn binned(facets: &Facets, tree: &mut Binary) {
         let [first, count] = tree.links.at(node);
         if count as usize > LANES {
             let range = first as usize..(first + count) as usize;
-            let left = split(facets, tree.order.part_mut(range.clone()), level < SAH_LEVELS);
+            let halvings = (count as usize).div_ceil(LANES).next_power_of_two().trailing_zeros() as usize;
+            // halved by count where the levels that halving takes (25 for 2^28 facets) are all that are left
+            let by_area = level + halvings < MOST_LEVELS;
+            let left = split(facets, tree.order.part_mut(range.clone()), by_area);
             let own = tree.order.part(range);
             let (a, b) = own.split_at(left.min(own.len()));
             let (a, b) = (bounds(facets, a), bounds(facets, b));

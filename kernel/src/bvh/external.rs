@@ -6,8 +6,9 @@ use crate::math::Vec3;
 use crate::ray::{self, Hit, Ray};
 use core::fmt;
 
-/// Most rays that an [`Intersector`] is asked for at once.
-pub const BATCH: usize = 32;
+/// Most rays that an [`Intersector`] is asked for at once: they wait on the stack, which is small where there is no
+/// standard library.
+pub const BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
 
 /// No facet among the answers.
 pub const NO_FACET: u32 = u32::MAX;
@@ -54,8 +55,7 @@ impl External<'_> {
     /// What the tracer says of many rays, or `tree` where an answer names a facet that the ray does not meet.
     pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let mut facets = [NO_FACET; BATCH];
-        for start in (0..rays.len()).step_by(BATCH) {
-            let (rays, hits) = (rays.part(start..rays.len()).head(BATCH), hits.part_mut(start..hits.len()));
+        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
             let facets = facets.head_mut(rays.len());
             facets.fill(NO_FACET);
             self.tracer.first(rays, facets);
@@ -68,12 +68,10 @@ impl External<'_> {
     /// What the tracer says of many rays.
     pub fn any_many(&self, rays: &[Ray], occluded: &mut [bool]) {
         let mut answers = [0; BATCH];
-        for start in (0..rays.len()).step_by(BATCH) {
-            let rays = rays.part(start..rays.len()).head(BATCH);
+        for (rays, places) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
             let answers = answers.head_mut(rays.len());
             answers.fill(0);
             self.tracer.any(rays, answers);
-            let places = occluded.part_mut(start..occluded.len());
             places.iter_mut().zip(&*answers).for_each(|(place, answer)| *place = *answer != 0);
         }
     }

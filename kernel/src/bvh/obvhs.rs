@@ -1,7 +1,7 @@
 //! The tree built by the crate obvhs, brought into the kernel's binary form.
 
-use super::LANES;
 use super::build::{Aabb, Binary, Facets, binned};
+use super::{LANES, MOST_LEVELS};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
@@ -20,10 +20,6 @@ const SETTINGS: BvhBuildParams = BvhBuildParams {
     max_prims_per_leaf: 1,
     collapse_traversal_cost: 1.0,
 };
-
-/// Deeper trees, which take meshes of absurd proportions, are left to the kernel's own builder, whose depth is
-/// bounded.
-const MOST_LEVELS: usize = 68;
 
 /// PLOC with reinsertion.
 pub(super) fn ploc(facets: &Facets, tree: &mut Binary) {
@@ -74,6 +70,7 @@ fn convert(built: &Bvh2, tree: &mut Binary) -> bool {
             leaves(built, node, |own| ordered.push(facets[own as usize]));
             continue;
         }
+        // deeper trees, which take meshes of absurd proportions, are left to the kernel's own builder
         if level == MOST_LEVELS {
             return false;
         }

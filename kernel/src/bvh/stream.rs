@@ -4,18 +4,18 @@
 //! and nothing that a ray finds decides where another goes, so that the processor works ahead. Children follow in the
 //! order of their distance from the ray to which they are nearest.
 
-use super::traverse::{Beam, SHORT, Walk};
+use super::traverse::{self, Beam, SHORT, Walk};
 use super::{Bvh, LEAF, PAIR, STACK};
 use crate::index::IndexMut;
 use crate::ray::{Hit, Ray};
 use crate::simd::{self, LaneTask, Lanes};
 
-/// Words of a set of rays. Large groups are faster (128 rays of a facet trace at 1.2 times the speed of 64) and take
-/// stack, some 120 bytes a ray, which small machines lack.
-const WORDS: usize = if cfg!(all(target_pointer_width = "64", not(target_os = "none"))) { 4 } else { 1 };
+/// Rays of a group. Large groups are faster (128 rays of a facet trace at 1.2 times the speed of 64) and take stack, some
+/// 250 bytes a ray with what a caller keeps of each, which machines without the standard library lack.
+pub(crate) const GROUP: usize = if cfg!(feature = "std") { 128 } else { 8 };
 
-/// Rays of a group.
-pub(crate) const GROUP: usize = WORDS * 32;
+/// Words of a set of rays.
+const WORDS: usize = GROUP.div_ceil(32);
 
 type Set = [u32; WORDS];
 
@@ -30,7 +30,7 @@ struct Visit {
 /// See [`Bvh::closest_many`].
 pub(super) fn closest(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
     for (rays, hits) in rays.chunks(GROUP).zip(hits.chunks_mut(GROUP)) {
-        search::<false>(bvh, rays, hits);
+        search(bvh, rays, hits, false);
     }
 }
 
@@ -38,33 +38,42 @@ pub(super) fn closest(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
 pub(super) fn occluded(bvh: &Bvh, rays: &[Ray], occluded: &mut [bool]) {
     for (rays, occluded) in rays.chunks(GROUP).zip(occluded.chunks_mut(GROUP)) {
         let mut hits = [None; GROUP];
-        search::<true>(bvh, rays, &mut hits);
+        search(bvh, rays, &mut hits, true);
         occluded.iter_mut().zip(hits).for_each(|(place, hit)| *place = hit.is_some());
     }
 }
 
-fn search<const ANY: bool>(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    if bvh.levels * 7 < SHORT {
-        simd::run_lanes(bvh.isa, Search::<ANY, SHORT> { bvh, rays, hits });
-    } else {
-        deep::<ANY>(bvh, rays, hits);
+fn search(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>], any: bool) {
+    if traverse::is_short(bvh) { short(bvh, rays, hits, any) } else { deep(bvh, rays, hits, any) }
+}
+
+/// Apart, so that its stack is no burden to what the caller does with the hits.
+#[inline(never)]
+fn short(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>], any: bool) {
+    simd::run_lanes(bvh.isa, Search::<SHORT> { bvh, rays, hits, any });
+}
+
+/// Apart, so that only who has a deep tree pays for the long stack; small stacks have no room for it.
+#[inline(never)]
+fn deep(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>], any: bool) {
+    if cfg!(feature = "std") {
+        simd::run_lanes(bvh.isa, Search::<STACK> { bvh, rays, hits, any });
+        return;
+    }
+    for (ray, hit) in rays.iter().zip(hits) {
+        *hit = traverse::search_deep(bvh, ray, any);
     }
 }
 
-/// Apart, so that only who has a deep tree pays for the long stack.
-#[inline(never)]
-fn deep<const ANY: bool>(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>]) {
-    simd::run_lanes(bvh.isa, Search::<ANY, STACK> { bvh, rays, hits });
-}
-
 /// The search for the first hits, or for any, of one group.
-struct Search<'a, const ANY: bool, const N: usize> {
+struct Search<'a, const N: usize> {
     bvh: &'a Bvh<'a>,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
+    any: bool,
 }
 
-impl<const ANY: bool, const N: usize> LaneTask for Search<'_, ANY, N> {
+impl<const N: usize> LaneTask for Search<'_, N> {
     type Out = ();
 
     #[inline(always)]
@@ -79,8 +88,8 @@ impl<const ANY: bool, const N: usize> LaneTask for Search<'_, ANY, N> {
             }
         }
         if !self.bvh.boxes.is_empty() {
-            let Search { bvh, rays, hits } = self;
-            Group { lanes, bvh, rays, hits, walks: &mut walks, alive }.walk::<ANY, N>();
+            let Search { bvh, rays, hits, any } = self;
+            Group { lanes, bvh, rays, hits, walks: &mut walks, alive, any }.walk::<N>();
         }
     }
 }
@@ -93,23 +102,24 @@ struct Group<'a, L> {
     walks: &'a mut [Walk; GROUP],
     /// Rays that still look for a hit.
     alive: Set,
+    any: bool,
 }
 
 impl<L: Lanes> Group<'_, L> {
     #[inline(always)]
-    fn walk<const ANY: bool, const N: usize>(mut self) {
+    fn walk<const N: usize>(mut self) {
         let mut stack = [Visit { near: 0.0, child: 0, rays: self.alive }; N];
         let mut top = 1;
         while top > 0 {
             top -= 1;
             let Some(&Visit { near, child, mut rays }) = stack.get(top) else { return };
-            if ANY {
+            if self.any {
                 rays.iter_mut().zip(self.alive).for_each(|(own, alive)| *own &= alive);
             }
             if child & LEAF == 0 {
                 self.node(child, &rays, &mut stack, &mut top);
             } else {
-                self.leaf::<ANY>(near, child, &rays);
+                self.leaf(near, child, &rays);
             }
         }
     }
@@ -164,7 +174,7 @@ impl<L: Lanes> Group<'_, L> {
 
     /// Tests the packets of a leaf: first which of the rays may meet which facets, then whether they do.
     #[inline(always)]
-    fn leaf<const ANY: bool>(&mut self, near: f32, leaf: u32, rays: &Set) {
+    fn leaf(&mut self, near: f32, leaf: u32, rays: &Set) {
         let first = (leaf & !(LEAF | PAIR)) as usize;
         for index in first..=first + usize::from(leaf & PAIR != 0) {
             let Some(packet) = self.bvh.lanes(index) else { return };
@@ -187,7 +197,7 @@ impl<L: Lanes> Group<'_, L> {
                     continue;
                 };
                 self.walks[number].confirm(self.bvh, ray, packet.2, u32::from(inside), hit);
-                if ANY && hit.is_some() {
+                if self.any && hit.is_some() {
                     self.alive[number / 32 % WORDS] &= !(1 << (number % 32));
                 }
             }

@@ -36,40 +36,53 @@ pub(super) const SLACK: f64 = 16.0;
 /// Entries of the short stack, enough for nine levels of nodes.
 pub(super) const SHORT: usize = 64;
 
+/// Whether a tree's walk has a stack of its own length: on 32 bits, where code is scarce and f64 is slow, all have the long
+/// one.
+#[inline(always)]
+pub(super) fn is_short(bvh: &Bvh) -> bool {
+    cfg!(target_pointer_width = "64") && bvh.levels * 7 < SHORT
+}
+
 /// See [`Bvh::closest`].
 pub(super) fn closest(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    if bvh.levels * 7 < SHORT { search::<false, SHORT>(bvh, ray) } else { deep::<false>(bvh, ray) }
+    search(bvh, ray, false)
 }
 
 /// See [`Bvh::occluded`].
 pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
-    let hit = if bvh.levels * 7 < SHORT { search::<true, SHORT>(bvh, ray) } else { deep::<true>(bvh, ray) };
-    hit.is_some()
+    search(bvh, ray, true).is_some()
 }
 
-#[inline(always)]
-fn search<const ANY: bool, const N: usize>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<ANY, N> { bvh, ray })
+/// The first hit, or, where `any` will do, the one that is found first.
+fn search(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
+    if is_short(bvh) { search_short(bvh, ray, any) } else { search_deep(bvh, ray, any) }
+}
+
+/// Apart, so that its stack is no burden to who has a deep tree.
+#[inline(never)]
+fn search_short(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
+    simd::run_lanes(bvh.isa, Search::<SHORT> { bvh, ray, any })
 }
 
 /// Apart, so that only who has a deep tree pays for the long stack.
 #[inline(never)]
-fn deep<const ANY: bool>(bvh: &Bvh, ray: &Ray) -> Option<Hit> {
-    search::<ANY, STACK>(bvh, ray)
+pub(super) fn search_deep(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
+    simd::run_lanes(bvh.isa, Search::<STACK> { bvh, ray, any })
 }
 
-/// The search for the first hit, or for any.
-struct Search<'a, const ANY: bool, const N: usize> {
+/// The search for the first hit, or for any: not two searches, which would be twice the code.
+struct Search<'a, const N: usize> {
     bvh: &'a Bvh<'a>,
     ray: &'a Ray,
+    any: bool,
 }
 
-impl<const ANY: bool, const N: usize> LaneTask for Search<'_, ANY, N> {
+impl<const N: usize> LaneTask for Search<'_, N> {
     type Out = Option<Hit>;
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        Walk::new(self.bvh, self.ray)?.search::<L, ANY, N>(lanes, self.bvh, self.ray)
+        Walk::new(self.bvh, self.ray)?.search::<L, N>(lanes, self.bvh, self.ray, self.any)
     }
 }
 
@@ -170,12 +183,7 @@ impl Walk {
 
     /// The walk itself: nearest child first, the rest on the stack with their distances.
     #[inline(always)]
-    fn search<L: Lanes, const ANY: bool, const N: usize>(
-        mut self,
-        lanes: L,
-        bvh: &Bvh,
-        ray: &Ray,
-    ) -> Option<Hit> {
+    fn search<L: Lanes, const N: usize>(mut self, lanes: L, bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
         let beam = Beam::new(lanes, &self);
         let mut best = None;
         let mut stack = [0u64; N];
@@ -207,7 +215,7 @@ impl Walk {
                 }
             } else {
                 self.leaf(&beam, bvh, ray, next, &mut best);
-                if ANY && best.is_some() {
+                if any && best.is_some() {
                     return best;
                 }
             }

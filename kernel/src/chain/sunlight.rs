@@ -1,6 +1,7 @@
 //! Sunlight on a point that a chain meets: straight, mirrored by flat facets, and in lobes.
 
-use super::{Leg, Path, Sample, Solved, Terms};
+use super::outlook::{Toward, may_meet};
+use super::{How, Leg, Path, Sample, Solved, Terms};
 use crate::coupling::word::LONGEST;
 use crate::index::{Index, IndexMut};
 use crate::math::{FRAC_1_PI, Vec3, pow, reflect, sqrt};
@@ -10,9 +11,16 @@ use crate::scene::MAX_BANDS;
 use crate::sun::Sun;
 use crate::sun_image::{CUTOFF, SAME};
 
-/// Rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them agree,
-/// these are enough.
+/// Most rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them
+/// agree, these are enough.
 const DISC_RAYS: (u32, u32) = (16, 4);
+
+/// So many of them that what is at stake is wrong by a part of the tolerance: half of it by n^-3/4, at the middle of a
+/// penumbra, is to be this part.
+const DISC_ERROR: f64 = 0.25;
+
+/// Penumbrae that these rays leave less wrong, in tolerances, need no others.
+const SAMPLED: f64 = 0.1;
 
 /// The most rays toward the sun's disc.
 const MOST_DISC_RAYS: u32 = 1024;
@@ -24,7 +32,7 @@ impl Solved<'_> {
         &self,
         leg: &Leg<'_>,
         surface: &Surface,
-        sample: Sample,
+        how: &mut How<'_, '_>,
         path: &mut Path,
     ) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
@@ -32,11 +40,21 @@ impl Solved<'_> {
         if cosine <= 0.0 {
             return 0.0;
         }
+        let known = how.outlook.before(self, surface, Toward::Sun, (sun.direction(), sun.half_angle()));
+        if known.is_some_and(<[u32]>::is_empty) && surface.normal.dot(sun.direction()) > sun.half_angle() {
+            // all of the disc is above the facet
+            return cosine;
+        }
         let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
         let mut lit = 0.0;
-        let all = self.over_disc(sun, at_stake, surface, sample, path, |path, toward, share| {
-            path.rays += 1;
-            let seen = !self.bvh.occluded(&surface.leave(toward));
+        let all = self.over_disc(sun, at_stake, surface, how.sample, path, |path, toward, share| {
+            let ray = surface.leave(toward);
+            let seen = match known {
+                Some([]) => true,
+                Some(known) => self.bvh.closest_among(&ray, known).is_none(),
+                None => !self.bvh.occluded(&ray),
+            };
+            path.rays += u32::from(known.is_none_or(|k| !k.is_empty()));
             lit += if seen { share } else { 0.0 };
             seen
         });
@@ -63,8 +81,12 @@ impl Solved<'_> {
         // them bit by bit
         let (sequence, coordinate, mut count, mut goal) = match sample {
             Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
-            Sample::Alone(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.0),
-            Sample::Glance(seed) => (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, DISC_RAYS.1),
+            Sample::Alone(seed) => {
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.0))
+            }
+            Sample::Glance(seed) => {
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.1))
+            }
         };
         let (mut lit, mut all) = (0.0, 0.0);
         while count < goal {
@@ -77,15 +99,27 @@ impl Solved<'_> {
                 lit += if ray(path, toward, share) { share } else { 0.0 };
             }
             if count == goal && lit != 0.0 && lit != all {
-                path.sampled = true;
-                if matches!(sample, Sample::Alone(_)) && count < MOST_DISC_RAYS {
-                    let part = lit / all;
-                    let error = sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
-                    goal *= if error * at_stake > self.settings.tolerance { 2 } else { 1 };
+                let part = lit / all;
+                let error = at_stake * sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
+                if matches!(sample, Sample::Alone(_))
+                    && count < MOST_DISC_RAYS
+                    && error > self.settings.tolerance
+                {
+                    goal *= 2;
+                } else if error > SAMPLED * self.settings.tolerance {
+                    path.sampled = true;
+                } else {
+                    path.noise += error;
                 }
             }
         }
         all
+    }
+
+    /// Rays toward the sun's disc to begin with.
+    fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
+        let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.tolerance);
+        (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
 
     /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
@@ -103,9 +137,9 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn add_images(
         &self,
-        leg: &Leg<'_>,
+        leg: &mut Leg<'_>,
         surface: &Surface,
-        sample: Sample,
+        how: &mut How<'_, '_>,
         to: &mut [f64; MAX_BANDS],
         path: &mut Path,
     ) {
@@ -113,18 +147,27 @@ impl Solved<'_> {
         let (sides, bands) = (self.scene.sides(), self.shape.bands);
         let side = surface.facet * sides + surface.side;
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors + 1));
-        for axis in self.images.of(self.elements.facet_sides(), side) {
+        for (n, axis) in (0..).zip(self.images.of(self.elements.facet_sides(), side)) {
             let image = sun.seen_toward(axis);
             let cosine = image.cosine(surface.normal);
             if cosine <= 0.0 {
                 continue;
             }
+            let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
+            let shown = |&facet: &u32| {
+                let corners = self.scene.corners().at(facet as usize);
+                may_meet(&corners, surface.point, axis, sun.half_angle())
+            };
+            if known.is_some_and(|mirrors| !mirrors.iter().any(shown)) {
+                continue;
+            }
             let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
-            let (mut lit, mut products) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
-            let all = self.over_disc(&image, at_stake, surface, sample, path, |path, toward, share| {
-                let seen = self.mirrored_sun(sun, surface, (toward, axis), most, &mut products, path);
+            let [lit, products] = &mut *leg.images;
+            lit.head_mut(bands).fill(0.0);
+            let all = self.over_disc(&image, at_stake, surface, how.sample, path, |path, toward, share| {
+                let seen = self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
                 if seen {
-                    lit.iter_mut().zip(&products).take(bands).for_each(|(sum, p)| *sum += share * p);
+                    lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
                 }
                 seen
             });
@@ -172,6 +215,12 @@ impl Solved<'_> {
             }
             mirrors += 1;
             axis = reflect(axis, surface.normal);
+            let (sides, side) =
+                (self.elements.facet_sides(), surface.facet * self.scene.sides() + surface.side);
+            if 1.0 - axis.dot(sun.direction()) >= SAME && !self.images.may_show(sides, side, axis) {
+                // what this mirror shows is no image of the sun
+                return false;
+            }
             ray = surface.leave(reflect(ray.direction, surface.normal));
         }
     }

@@ -75,18 +75,30 @@ impl<'m> Words<'m> {
 
     /// The word with one more letter; `None` where the table is full or the word has [`LONGEST`] letters.
     pub fn push(&mut self, word: u16, class: u32, scene: &Scene<'_>) -> Option<u16> {
-        let mut higher = [0u32; LONGEST];
-        let (mut at, mut count) = (word, 0);
-        while at != EMPTY && self.get(at).class > class {
-            *higher.get_mut(count)? = self.get(at).class;
-            (at, count) = (self.get(at).parent, count + 1);
-        }
         if self.get(word).depth as usize >= LONGEST {
             return None;
         }
+        let (mut at, mut higher) = (word, 0);
+        while at != EMPTY && self.get(at).class > class {
+            (at, higher) = (self.get(at).parent, higher + 1);
+        }
         let mut new = self.append(at, class, scene)?;
-        for &letter in higher.iter().take(count).rev() {
-            new = self.append(new, letter, scene)?;
+        // the higher letters again, some at a time: links lead from the last to the first
+        let mut letters = [0u32; 16];
+        while higher > 0 {
+            let some = higher.min(letters.len());
+            let mut at = word;
+            for _ in some..higher {
+                at = self.get(at).parent;
+            }
+            for letter in letters.head_mut(some).iter_mut().rev() {
+                *letter = self.get(at).class;
+                at = self.get(at).parent;
+            }
+            higher -= some;
+            for &letter in letters.head(some) {
+                new = self.append(new, letter, scene)?;
+            }
         }
         Some(new)
     }
