@@ -155,8 +155,8 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         short("tree", bytes, |memory| Bvh::build_obvhs(corners, areas, Isa::BASELINE, memory).err());
         let mut memory = vec![0; bytes];
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
-        let bytes = Facing::bytes(&scene).unwrap();
-        short("planes", bytes, |memory| Facing::new(&scene, &bvh, Isa::BASELINE, memory).err());
+        let bytes = Facing::bytes(&scene, true).unwrap();
+        short("planes", bytes, |memory| Facing::new(&scene, &bvh, true, memory).err());
         short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| Cut::new(&scene, 1e-2, memory).err());
         let mut trees = vec![0; Cut::bytes(facets, 1e-2).unwrap()];
         let mut cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();

@@ -11,7 +11,7 @@ use crate::index::{Index, IndexMut, copy, pieces};
 use crate::math::{Vec3, sqrt};
 use crate::mirror::{OFFSET, opens_to_sky};
 use crate::scene::Scene;
-use crate::simd::{Isa, Task, run};
+use crate::simd::{Task, run};
 
 /// Sides of facets beyond which no planes are compared: the table's bits grow with their square.
 pub const MOST: usize = 8192;
@@ -47,28 +47,30 @@ impl<'m> Facing<'m> {
     /// Nothing is known.
     pub const NONE: Facing<'static> = Facing { before: &[], screens: &[], shared: &[], words: 0, sides: 1 };
 
-    fn words(scene: &Scene<'_>) -> usize {
-        if scene.facets() * scene.sides() > MOST { 0 } else { scene.facets().div_ceil(64) }
+    fn words(scene: &Scene<'_>, wanted: bool) -> usize {
+        let few = scene.facets() * scene.sides() <= MOST;
+        if wanted && few { scene.facets().div_ceil(64) } else { 0 }
     }
 
-    /// Bytes for a scene: at most 9 MiB.
-    pub fn bytes(scene: &Scene<'_>) -> Result<usize, Error> {
-        let words = Facing::words(scene);
+    /// Bytes for a scene: at most 9 MiB. Not `wanted` where the sky's directions are to be kept: what uses the table then
+    /// gains nothing by it.
+    pub fn bytes(scene: &Scene<'_>, wanted: bool) -> Result<usize, Error> {
+        let words = Facing::words(scene, wanted);
         let rows = scene.facets() * scene.sides();
         let blocks = if words > 0 { scene.facets().div_ceil(LANES) } else { 0 };
         let sets = Need::new().and::<u64>(if words > 0 { rows * words } else { 0 });
         sets.and::<u64>(words).and::<u64>(words).and::<u64>(2 * words).and::<Corners>(blocks).bytes()
     }
 
-    /// Compares the planes of all facets with all facets.
+    /// Compares the planes of all facets with all facets, or none where that is not `wanted`.
     pub fn new(
         scene: &Scene<'_>,
         bvh: &Bvh<'_>,
-        isa: Isa,
+        wanted: bool,
         memory: &'m mut [u8],
     ) -> Result<Facing<'m>, Error> {
-        let (words, sides) = (Facing::words(scene), scene.sides());
-        let mut arena = Arena::new(memory, Facing::bytes(scene)?)?;
+        let (words, sides) = (Facing::words(scene, wanted), scene.sides());
+        let mut arena = Arena::new(memory, Facing::bytes(scene, wanted)?)?;
         if words == 0 {
             return Ok(Facing { before: &[], screens: &[], shared: &[], words, sides });
         }
@@ -97,7 +99,10 @@ impl<'m> Facing<'m> {
             let height = scene.corners().at(facet).iter().map(|c| c.dot(normal)).sum::<f64>() / 3.0;
             let slack = SLACK * sqrt(scene.areas().at(facet)) + 0.5 * OFFSET;
             let front = rows.head_mut(words);
-            run(isa, Compare { blocks, normal, height, slack, front: &mut *front, behind: &mut *behind });
+            run(
+                bvh.isa(),
+                Compare { blocks, normal, height, slack, front: &mut *front, behind: &mut *behind },
+            );
             for (front, (behind, real)) in front.iter_mut().zip(behind.iter_mut().zip(&*real)) {
                 (*front, *behind) = (*front & real, *behind & real);
             }
@@ -390,6 +395,7 @@ fn apart(a: &[Vec3; 3], b: &[Vec3; 3], (facet, normal): (&[Vec3; 3], Vec3)) -> b
 mod tests {
     use super::*;
     use crate::scene::{MaterialInput, SceneInput};
+    use crate::simd::Isa;
 
     fn facing(vertices: &[[f64; 3]], facets: &[[u32; 3]], check: impl FnOnce(&Scene<'_>, &Facing<'_>)) {
         let material = MaterialInput { diffuse: &[0.5], specular: &[0.0], emission: &[0.0], gloss: None };
@@ -405,8 +411,8 @@ mod tests {
         };
         let (mut memory, mut tree, mut table) = ([0u8; 4096], [0u8; 16384], [0u8; 4096]);
         let scene = Scene::new(&input, &mut memory).unwrap();
-        let bvh = Bvh::build(scene.corners(), scene.areas(), Isa::BASELINE, &mut tree).unwrap();
-        check(&scene, &Facing::new(&scene, &bvh, Isa::detect(), &mut table).unwrap());
+        let bvh = Bvh::build(scene.corners(), scene.areas(), Isa::detect(), &mut tree).unwrap();
+        check(&scene, &Facing::new(&scene, &bvh, true, &mut table).unwrap());
     }
 
     /// Two triangles that face each other across a gap of 2, and a third between them or beside.

@@ -194,8 +194,8 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        let mut planes = Memory::new(Facing::bytes(&scene)?);
-        let facing = Facing::new(&scene, &bvh, self.isa, planes.bytes_mut())?;
+        let mut planes = Memory::new(Facing::bytes(&scene, !settings.directional)?);
+        let facing = Facing::new(&scene, &bvh, !settings.directional, planes.bytes_mut())?;
         let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
         let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
         let probing = policy::probing(&rows);
