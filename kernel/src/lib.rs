@@ -15,6 +15,7 @@
 //! |---|---|---|---|
 //! | scene | [`scene`] | mesh, materials | caller's arrays → validated facets in scene coordinates |
 //! | tree | [`bvh`] over [`ray`] | mesh | facets → first hit of any ray |
+//! | planes | [`facing`] | mesh | facets → what may stand between two of them |
 //! | elements | [`subdivide`], [`element`] | mesh, tolerance | facets → unknowns of the system |
 //! | coupling | [`coupling`] ([`mirror`], [`lobe`], [`qmc`]) | mesh, materials, tolerance | unknowns → rows of extended form factors |
 //! | light | [`light`] ([`sky`], [`sun`], [`beam`]) | light | coupling, sky, sun → irradiance before diffuse reflection |
