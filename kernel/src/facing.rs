@@ -227,7 +227,7 @@ impl Clear {
     }
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
-    /// [`TRIES`] go.
+    /// `TRIES` go.
     pub fn new(
         scene: &Scene<'_>,
         facing: &Facing<'_>,

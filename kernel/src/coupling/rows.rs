@@ -6,7 +6,7 @@
 //! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
-//! What nothing hides ([`crate::facing`]) is entered in closed form instead ([`super::exact`]) where that costs less:
+//! What nothing hides ([`crate::facing`]) is entered in closed form instead (`exact.rs`) where that costs less:
 //! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
 //! hemisphere, which is known.
 //!
