@@ -120,7 +120,10 @@ impl Tracer<'_, '_> {
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
         let mut fold = FOLD;
         for first in (0..rays).step_by(BATCH) {
-            self.rays(facet, side, &sequence, first..rays.min(first + BATCH as u32), &mut stats)?;
+            let end = rays.min(first + BATCH as u32);
+            for start in (first..end).step_by(GROUP) {
+                self.rays(facet, side, &sequence, start..end.min(start + GROUP as u32), &mut stats)?;
+            }
             if self.sink.present() >= fold {
                 fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
             }
@@ -131,7 +134,7 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    /// The rays of these numbers, at most [`BATCH`], from mirror to mirror together.
+    /// The rays of these numbers, at most [`GROUP`], from mirror to mirror together.
     fn rays(
         &mut self,
         facet: usize,
@@ -141,8 +144,8 @@ impl Tracer<'_, '_> {
         stats: &mut Row,
     ) -> Option<()> {
         let (scene, bvh) = (self.scene, self.bvh);
-        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BATCH];
-        let mut chains: [Option<Chain>; BATCH] = [None; BATCH];
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
+        let mut chains: [Option<Chain>; GROUP] = [None; GROUP];
         let mut count = 0;
         for index in numbers {
             let (p, q) = sequence.pair(index, 0);
@@ -160,12 +163,12 @@ impl Tracer<'_, '_> {
                 count += 1;
             }
         }
-        let mut hidden = [false; BATCH];
+        let mut hidden = [false; GROUP];
         bvh.occluded_many(rays.head(count), hidden.head_mut(count));
         for (chain, _) in chains.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden) {
             *chain = None;
         }
-        let mut hits = [None; BATCH];
+        let mut hits = [None; GROUP];
         while count > 0 {
             let mut left = 0;
             for at in 0..count {
@@ -228,8 +231,11 @@ impl Tracer<'_, '_> {
     }
 }
 
-/// Rays of a mirror that are traced together.
+/// Rays of a mirror after which records are folded.
 const BATCH: usize = 32;
+
+/// Rays that are traced together: they wait on the stack, which is small where there is no standard library.
+const GROUP: usize = if cfg!(feature = "std") { BATCH } else { 4 };
 
 /// Sunlight on its way from mirror to mirror.
 #[derive(Clone, Copy)]

@@ -227,7 +227,7 @@ impl Clear {
     }
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
-    /// 64 trials of facets that planes leave in question go.
+    /// `TRIES` go.
     pub fn new(
         scene: &Scene<'_>,
         facing: &Facing<'_>,

@@ -218,8 +218,8 @@ fn add_escapes<L: Lanes>(
 /// Points on an element at which the sun is tested: all of the first share agree, or all are taken.
 const SUN_POINTS: (u32, u32) = (16, 128);
 
-/// Rays toward the sun that are traced together.
-const SUN_BATCH: usize = 32;
+/// Rays toward the sun that are traced together: they wait on the stack, which is small where there is no standard library.
+const SUN_BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
 
 /// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
 /// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.

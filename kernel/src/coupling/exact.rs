@@ -110,6 +110,11 @@ struct Lanes {
     count: usize,
 }
 
+impl Lanes {
+    // a constant: arrays of it are made where they stand, without a copy on the stack
+    const EMPTY: Lanes = Lanes { block: TriangleBlock::EMPTY, targets: [None; LANES], count: 0 };
+}
+
 /// Mirrors whose rays are told apart: classes beyond share a kind with others.
 pub(super) const MIRROR_KINDS: usize = 7;
 
@@ -170,14 +175,15 @@ struct Blocked {
 
 impl Entries<'_, '_> {
     /// Adds the entries of all that is proven to be clear. `None` where the memory is full.
+    // apart: its lanes do not burden the stack of rays
+    #[inline(never)]
     pub fn add(mut self, receiver: &Receiver, facing: &Facing<'_>, clear: &Clear) -> Option<Known> {
         // a small part of the error of rays, 0.9 n^-2/3
         let error = 0.05 * pow(f64::from(self.rays), -2.0 / 3.0);
         let rules = Rules::new(error);
         let quarters = [0, 1, 2, 3].map(|q| part_of(&receiver.corners, q));
         let place = Place { receiver, quarters, rules, middle: middle(&receiver.corners) };
-        let mut lanes =
-            [(); 3].map(|()| Lanes { block: TriangleBlock::EMPTY, targets: [None; LANES], count: 0 });
+        let mut lanes = [Lanes::EMPTY; 3];
         let (mut known, mut blocked) = (Known::default(), Blocked::default());
         let sides = self.scene.sides();
         for facet in facing.before(receiver.facet, receiver.side) {

@@ -6,7 +6,7 @@
 //! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
-//! What nothing hides ([`crate::facing`]) is entered in closed form instead where that costs less:
+//! What nothing hides ([`crate::facing`]) is entered in closed form instead (`exact.rs`) where that costs less:
 //! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
 //! hemisphere, which is known.
 //!
@@ -306,6 +306,7 @@ impl Tracer<'_, '_> {
     }
 
     /// The row by rays alone.
+    #[inline(never)]
     fn sampled(&mut self, start: &Start, most: u32) -> Option<Tally> {
         let tally = self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None)?;
         let mixed = tally.mixed();
@@ -318,6 +319,8 @@ impl Tracer<'_, '_> {
 
     /// The row with entries in closed form to what nothing hides, and rays for the rest; the inner value is none where
     /// rays alone cost less, or where parts of the element may lie inside a body.
+    // apart, as the next: what one needs does not burden the stack of the other
+    #[inline(never)]
     fn closed(&mut self, start: &Start, normal: Vec3, most: u32) -> Option<Option<Tally>> {
         if self.settings.directional {
             // what is hidden of a sky that varies has to be known by direction: rays tell that, and the rest with it
@@ -368,7 +371,10 @@ impl Tracer<'_, '_> {
             return Some(true);
         }
         let mut tally = Tally::default();
-        self.batch(start, &mut tally, FEWEST.min(GROUP as u32), None)?;
+        while tally.rays < FEWEST {
+            let count = (FEWEST - tally.rays).min(GROUP as u32);
+            self.batch(start, &mut tally, count, None)?;
+        }
         self.sink.drop_row();
         let wanted = enough(most, tally.rays, f64::from(tally.blocked));
         Some(f64::from(wanted) * RAY >= entries as f64)
@@ -409,6 +415,7 @@ impl Tracer<'_, '_> {
     }
 
     /// Turns what the parts saw into the row.
+    #[inline(never)]
     fn end_row(&mut self, tally: &Tally) {
         let (exposed, hidden) = tally.exposed();
         let closed = tally.known.share() > 0.0;
