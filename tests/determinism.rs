@@ -8,6 +8,7 @@ mod stages;
 mod support;
 
 use blik_kernel::camera::{CameraInput, Sampling};
+use blik_kernel::host::Settings;
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::SkyModel;
 use case::{Case, SkyOf, SunOf, orthographic, timeless, within};
@@ -81,7 +82,7 @@ fn splits_trees_and_instruction_sets_change_no_bit() {
     for case in [spectral(), plain()] {
         let plan = Plan { parts: 1, isa: Isa::BASELINE, obvhs: false, tolerance: TOLERANCE };
         let first = staged(&case, plan);
-        assert!(first.0.records > 1000 && first.0.image.refined > 0, "something is computed: {:?}", first.0);
+        assert!(first.0.records > 500 && first.0.image.refined > 0, "something is computed: {:?}", first.0);
         let others = [
             Plan { parts: 2, ..plan },
             Plan { parts: 3, isa: Isa::detect(), ..plan },
@@ -107,8 +108,8 @@ fn splits_trees_and_instruction_sets_change_no_bit() {
 
 #[test]
 fn the_owning_layer_gives_the_stages_bits() {
-    for case in [spectral(), plain()] {
-        let host = case.run(2, &within(TOLERANCE), &camera());
+    for (case, directional) in [(spectral(), true), (plain(), false)] {
+        let host = case.run(2, &Settings { directional, ..within(TOLERANCE) }, &camera());
         let plan = Plan { parts: 3, isa: Isa::BASELINE, obvhs: false, tolerance: TOLERANCE };
         let (counts, pixels, _) = staged(&case, plan);
         assert_eq!(host.pixel_bits(), pixels);

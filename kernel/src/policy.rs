@@ -230,13 +230,13 @@ const PASSES: f64 = 1.5;
 /// The most rounds of one image, and the most and the least by which the tolerance falls from one to the next: half of it
 /// takes some four times as long.
 const ROUNDS: u32 = 3;
-const STEPS: (f64, f64) = (0.25, 0.7);
+const STEPS: (f64, f64) = (0.4, 0.7);
 
 /// A round that leaves so much of the last one's estimate: more rounds would, too.
 const IDLE: f64 = 0.8;
 
 /// The most rays and bytes that another round may be expected to take.
-const MOST_RAYS: f64 = 1e9;
+const MOST_RAYS: f64 = 2e8;
 const MOST_BYTES: f64 = (2u64 << 30) as f64;
 
 /// One round of an image.

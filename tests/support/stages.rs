@@ -21,7 +21,7 @@ use blik_kernel::radiosity::{System, bound, sweeps};
 use blik_kernel::scene::{MAX_BANDS, Scene, SceneInput};
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
-use blik_kernel::sky::{Sky, SkyInput};
+use blik_kernel::sky::{Sky, SkyInput, SkyModel};
 use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
 use blik_kernel::sun_image::{self, Noting, SunImages};
@@ -205,8 +205,10 @@ pub fn run(
     let build = if plan.obvhs { Bvh::build_obvhs } else { Bvh::build };
     let bvh = build(scene.corners(), scene.areas(), plan.isa, &mut work.bvh[..bytes])?;
 
-    let facing = Facing::new(&scene, &bvh, true, &mut work.planes)?;
-    let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
+    // uniform skies need no directions: what nothing hides is in closed form then
+    let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
+    let facing = Facing::new(&scene, &bvh, !directional, &mut work.planes)?;
+    let settings = RowSettings::new(&scene, plan.tolerance, None, directional, false);
     let probing = policy::probing(&settings);
     let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
     loop {
