@@ -2,9 +2,10 @@
 
 use crate::judge::{Judge, Score, score};
 use crate::kernel;
-use crate::support::twin::Scene;
+use crate::support::twin::{Model, Scene};
 use blik_kernel::arena::Memory;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
+use blik_kernel::host::Settings;
 use std::fmt::Write as _;
 
 /// A scene that is meant to hurt, and how one looks at it.
@@ -58,7 +59,10 @@ impl Row {
 /// Blik's image: finite, not negative, not brighter than anything could be.
 pub fn image(hostile: &Hostile) -> (Vec<f64>, Vec<f64>, f64) {
     let what = format!("{} {}", hostile.family, hostile.severity);
-    kernel::solve(&hostile.scene, &kernel::within(hostile.tolerance), |host, lit| {
+    // as programs ask: directions of the sky for skies that vary, closed forms for the others
+    let directional = hostile.scene.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform));
+    let settings = Settings { directional, ..kernel::within(hostile.tolerance) };
+    kernel::solve(&hostile.scene, &settings, |host, lit| {
         let image = host.image(lit, &hostile.camera, false).unwrap();
         for (at, pixel) in image.pixels.iter().enumerate() {
             assert!(pixel.is_finite() && *pixel >= 0.0, "{what}: pixel {at} is {pixel}");
