@@ -667,7 +667,8 @@ typedef struct blik_settings {
      */
     int32_t all_irradiances;
     /**
-     * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
+     * Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory, and in
+     * closed form, sooner and more exactly, where nothing is hidden.
      */
     int32_t directional;
     /**

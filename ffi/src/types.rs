@@ -97,7 +97,8 @@ pub struct blik_settings {
     pub max_bounces: i32,
     /// Not 0: irradiance of all facets is wanted, also of those that reflect nothing diffusely; default 0.
     pub all_irradiances: i32,
-    /// Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory.
+    /// Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory, and in
+    /// closed form, sooner and more exactly, where nothing is hidden.
     pub directional: i32,
     /// Not 0: where the caller's memory is too small for the rows, their rays are halved until it is not; what that costs
     /// is in the report's error estimate. Default 0: the call is refused and tells the bytes that it would need.

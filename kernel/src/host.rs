@@ -53,7 +53,7 @@ pub struct Settings {
     /// Irradiance of all facets is wanted, also of those that reflect nothing diffusely.
     pub all_irradiances: bool,
     /// Keep the directions of blocked and mirrored light, so that a new sky needs no rays. Where it is false,
-    /// only uniform skies can light the scene.
+    /// only uniform skies can light the scene, and what nothing hides is entered in closed form, sooner and more exactly.
     pub directional: bool,
 }
 
