@@ -200,15 +200,24 @@ impl Clear {
         contains(&self.proven, facet * sides + side)
     }
 
-    /// As [`Clear::new`] where the receiver sees nothing else, facets being counted; none otherwise.
-    pub fn whole(scene: &Scene<'_>, facing: &Facing<'_>, receiver: &Receiver, most: usize) -> Option<Clear> {
+    /// Nothing is proven yet. What follows fills it where it stands: it is too large to be handed around.
+    pub const NONE: Clear = Clear { proven: [0; WORDS], elements: 0, all: true };
+
+    /// As [`Clear::prove`], facets being counted; whether the receiver sees nothing else.
+    pub fn prove_whole(
+        &mut self,
+        scene: &Scene<'_>,
+        facing: &Facing<'_>,
+        receiver: &Receiver,
+        most: usize,
+    ) -> bool {
         // the back of a one-sided facet may show, or is hidden by what no plane tells
         let back = |facet: usize| scene.sides() == 1 && heights(scene, facet, &receiver.corners).0 < -FLAT;
         if facing.is_empty() || facing.before(receiver.facet, receiver.side).any(back) {
-            return None;
+            return false;
         }
-        let clear = Clear::new(scene, facing, receiver, most, |_, _| 1);
-        clear.all.then_some(clear)
+        self.prove(scene, facing, receiver, most, |_, _| 1);
+        self.all
     }
 
     /// How many elements the receiver may see, `count` those of a side of a facet.
@@ -228,14 +237,14 @@ impl Clear {
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
     /// `TRIES` go.
-    pub fn new(
+    pub fn prove(
+        &mut self,
         scene: &Scene<'_>,
         facing: &Facing<'_>,
         receiver: &Receiver,
         most: usize,
         count: impl Fn(usize, usize) -> usize,
-    ) -> Clear {
-        let mut clear = Clear { proven: [0; WORDS], elements: 0, all: true };
+    ) {
         let mut tries = TRIES;
         for facet in facing.before(receiver.facet, receiver.side) {
             let (low, high) = heights(scene, facet, &receiver.corners);
@@ -246,18 +255,17 @@ impl Clear {
                 }
                 let count = count(facet, side);
                 if side < scene.sides()
-                    && clear.elements + count <= most
+                    && self.elements + count <= most
                     && facing.is_alone(facet)
                     && facing.clear(scene, receiver, (facet, side), &mut tries)
                 {
-                    insert(&mut clear.proven, facet * scene.sides() + side);
-                    clear.elements += count;
+                    insert(&mut self.proven, facet * scene.sides() + side);
+                    self.elements += count;
                 } else {
-                    clear.all = false;
+                    self.all = false;
                 }
             }
         }
-        clear
     }
 }
 

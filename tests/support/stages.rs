@@ -205,8 +205,8 @@ pub fn run(
     let build = if plan.obvhs { Bvh::build_obvhs } else { Bvh::build };
     let bvh = build(scene.corners(), scene.areas(), plan.isa, &mut work.bvh[..bytes])?;
 
-    let facing = Facing::new(&scene, &bvh, true, &mut work.planes)?;
     let settings = RowSettings::new(&scene, plan.tolerance, None, true, false);
+    let facing = Facing::new(&scene, &bvh, !settings.directional, &mut work.planes)?;
     let probing = policy::probing(&settings);
     let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
     loop {

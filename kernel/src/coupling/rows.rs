@@ -297,55 +297,56 @@ impl Tracer<'_, '_> {
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
         let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
-        let tally = match self.closed(&start, normal, most)? {
-            Some(tally) => tally,
-            None => self.sampled(&start, most)?,
-        };
+        let mut tally = Tally::default();
+        if !self.closed(&start, normal, most, &mut tally)? {
+            self.sampled(&start, most, &mut tally)?;
+        }
         self.end_row(&tally);
         Some(())
     }
 
     /// The row by rays alone.
     #[inline(never)]
-    fn sampled(&mut self, start: &Start, most: u32) -> Option<Tally> {
-        let tally = self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None)?;
+    fn sampled(&mut self, start: &Start, most: u32, tally: &mut Tally) -> Option<()> {
+        self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None, tally)?;
         let mixed = tally.mixed();
         if self.scene.sides() == 1 && mixed.contains(&true) {
             self.sink.drop_row();
-            return self.rays(start, (FEWEST.max(most / 16), most), mixed, None);
+            self.rays(start, (FEWEST.max(most / 16), most), mixed, None, tally)?;
         }
-        Some(tally)
+        Some(())
     }
 
-    /// The row with entries in closed form to what nothing hides, and rays for the rest; the inner value is none where
-    /// rays alone cost less, or where parts of the element may lie inside a body.
+    /// The row with entries in closed form to what nothing hides, and rays for the rest; false where rays alone cost
+    /// less, or where parts of the element may lie inside a body.
     // apart, as the next: what one needs does not burden the stack of the other
     #[inline(never)]
-    fn closed(&mut self, start: &Start, normal: Vec3, most: u32) -> Option<Option<Tally>> {
+    fn closed(&mut self, start: &Start, normal: Vec3, most: u32, tally: &mut Tally) -> Option<bool> {
         if self.settings.directional {
             // what is hidden of a sky that varies has to be known by direction: rays tell that, and the rest with it
-            return Some(None);
+            return Some(false);
         }
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
         let limit = (2 * most as usize).min(MOST_CLOSED);
         let possible = Clear::possible(self.scene, self.facing, &receiver, count);
-        if possible == 0 || possible > limit || !self.is_worth(start, possible, most)? {
-            return Some(None);
+        if possible == 0 || possible > limit || !self.is_worth(start, possible, most, tally)? {
+            return Some(false);
         }
-        let clear = Clear::new(self.scene, self.facing, &receiver, limit, count);
-        let mut tally = Tally::default();
+        let mut clear = Clear::NONE;
+        clear.prove(self.scene, self.facing, &receiver, limit, count);
+        *tally = Tally::default();
         if !clear.all || self.scene.largest_specular() > 0.0 {
-            tally = self.rays(start, (FEWEST, most), [false; BINS], Some(&clear))?;
+            self.rays(start, (FEWEST, most), [false; BINS], Some(&clear), tally)?;
             if tally.backs.iter().any(|b| *b > 0) {
                 self.sink.drop_row();
-                return Some(None);
+                return Some(false);
             }
         }
         if clear.elements == 0 {
             self.sink.drop_row();
-            return Some(None);
+            return Some(false);
         }
         let all = [true; PARTS];
         let entries = Entries {
@@ -357,23 +358,22 @@ impl Tracer<'_, '_> {
             slopes: slopes(all),
             departures: departures(all),
         };
-        tally.known = entries.add(&receiver, self.facing, &clear)?;
+        entries.add(&receiver, self.facing, &clear, &mut tally.known)?;
         if tally.known.share() > 1.0 + OVERFULL {
             self.sink.drop_row();
-            return Some(None);
+            return Some(false);
         }
-        Some(Some(tally))
+        Some(true)
     }
 
     /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
-    fn is_worth(&mut self, start: &Start, entries: usize, most: u32) -> Option<bool> {
+    fn is_worth(&mut self, start: &Start, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
         if entries <= FEWEST as usize {
             return Some(true);
         }
-        let mut tally = Tally::default();
         while tally.rays < FEWEST {
             let count = (FEWEST - tally.rays).min(GROUP as u32);
-            self.batch(start, &mut tally, count, None)?;
+            self.batch(start, tally, count, None)?;
         }
         self.sink.drop_row();
         let wanted = enough(most, tally.rays, f64::from(tally.blocked));
@@ -388,13 +388,14 @@ impl Tracer<'_, '_> {
         (fewest, most): (u32, u32),
         apart: [bool; BINS],
         clear: Option<&Clear>,
-    ) -> Option<Tally> {
-        let mut tally = Tally { apart, ..Tally::default() };
+        tally: &mut Tally,
+    ) -> Option<()> {
+        *tally = Tally { apart, ..Tally::default() };
         let rho = self.scene.largest_specular();
         let mut goal = fewest.min(most);
         while tally.rays < goal {
             let count = (goal - tally.rays).min(GROUP as u32);
-            self.batch(start, &mut tally, count, clear)?;
+            self.batch(start, tally, count, clear)?;
             if tally.rays == goal {
                 // what a mirror shows counts with its reflectance
                 goal = enough(
@@ -404,7 +405,7 @@ impl Tracer<'_, '_> {
                 );
             }
         }
-        Some(tally)
+        Some(())
     }
 
     /// Rays of an element of so much area: the image's mean square error, the sum of a n^-4/3 over all elements, is least

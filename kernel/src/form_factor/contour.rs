@@ -44,6 +44,7 @@ struct Integrand {
 }
 
 /// The double integral of ln r over the contours of both polygons, whose extent is about 1.
+#[inline(never)]
 pub(super) fn integral(isa: Isa, outer: &Convex, inner: &Convex) -> f64 {
     let mut sum = 0.0;
     for (start, end) in edges(outer.corners()) {
