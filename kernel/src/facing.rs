@@ -16,8 +16,8 @@ use crate::simd::{Task, run};
 /// Sides of facets beyond which no planes are compared: the table's bits grow with their square.
 pub const MOST: usize = 8192;
 
-/// Words of a set of facets.
-const WORDS: usize = MOST / 64;
+/// Words of a set of sides.
+pub(crate) const WORDS: usize = MOST / 64;
 
 /// Facets that rise before a plane by this share of its facet's extent hide no more than that share of it.
 const SLACK: f64 = 1e-6;
@@ -185,23 +185,31 @@ pub struct Receiver {
 const TRIES: u32 = 64;
 
 /// What a receiver sees that nothing hides: sides of facets, and how many elements they have.
-#[derive(Clone, Copy, Debug)]
-pub struct Clear {
-    proven: [u64; WORDS],
+#[derive(Debug)]
+pub struct Clear<'m> {
+    proven: &'m mut [u64],
     /// Elements of the proven sides.
     pub elements: usize,
     /// True where the receiver can see nothing else.
     pub all: bool,
 }
 
-impl Clear {
-    /// Whether rays need not find a side of a facet.
-    pub fn has(&self, facet: usize, side: usize, sides: usize) -> bool {
-        contains(&self.proven, facet * sides + side)
+impl<'m> Clear<'m> {
+    /// Words of memory for a scene's sides.
+    pub fn words(scene: &Scene<'_>) -> usize {
+        (scene.facets() * scene.sides()).div_ceil(64).min(WORDS)
     }
 
-    /// Nothing is proven yet. What follows fills it where it stands: it is too large to be handed around.
-    pub const NONE: Clear = Clear { proven: [0; WORDS], elements: 0, all: true };
+    /// Nothing is proven yet; `memory` has [`Clear::words`] words of any content.
+    pub fn new(memory: &'m mut [u64]) -> Clear<'m> {
+        memory.fill(0);
+        Clear { proven: memory, elements: 0, all: true }
+    }
+
+    /// Whether rays need not find a side of a facet.
+    pub fn has(&self, facet: usize, side: usize, sides: usize) -> bool {
+        contains(self.proven, facet * sides + side)
+    }
 
     /// As [`Clear::prove`], facets being counted; whether the receiver sees nothing else.
     pub fn prove_whole(
@@ -259,7 +267,7 @@ impl Clear {
                     && facing.is_alone(facet)
                     && facing.clear(scene, receiver, (facet, side), &mut tries)
                 {
-                    insert(&mut self.proven, facet * scene.sides() + side);
+                    insert(self.proven, facet * scene.sides() + side);
                     self.elements += count;
                 } else {
                     self.all = false;

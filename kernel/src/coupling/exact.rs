@@ -187,7 +187,7 @@ impl Entries<'_, '_> {
         mut self,
         receiver: &Receiver,
         facing: &Facing<'_>,
-        clear: &Clear,
+        clear: &Clear<'_>,
         known: &mut Known,
     ) -> Option<()> {
         // a small part of the error of rays, 0.9 n^-2/3
