@@ -341,10 +341,11 @@ pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usi
     }
 }
 
-/// Bytes of one lane's scratch memory while rays are followed, or a signature is found.
+/// Bytes of one lane's scratch memory while rays are followed, or a signature is found, and the sky behind it.
 fn lane_bytes() -> Result<usize, blik_error> {
     let rays = Need::new().and::<Terms>(1).and::<Work>(1).bytes()?;
-    Ok(rays.max(signature::scratch_bytes()?).next_multiple_of(ALIGNMENT))
+    let signature = signature::scratch_bytes()? + Need::new().and::<f64>(MAX_BANDS).bytes()?;
+    Ok(rays.max(signature).next_multiple_of(ALIGNMENT))
 }
 
 /// Bytes of scratch memory with which [`blik_radiance`] and [`blik_signatures`] keep all lanes of `run` busy.
@@ -527,13 +528,14 @@ fn measure(
 ) -> Result<(), blik_error> {
     let solved = solution.solved();
     let view = View::new(&solved, forward, cells)?;
-    let sums = signature::whole(&solved, &view, &mut *scratch)?;
-    let background = Arena::new(scratch, 0)?.take::<f64>(out.len())?;
+    let (scratch, rest) = scratch.split_at_mut_checked(signature::scratch_bytes()?).unwrap_or_default();
+    let sums = signature::whole(&solved, &view, scratch)?;
+    let background = Arena::new(rest, 0)?.take::<f64>(out.len())?;
     if let Some(sky) = &solution.light.sky {
         sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
     for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
-        let own = Signature::new(&sums, band, background);
+        let own = Signature::new(sums, band, background);
         *out = blik_signature {
             radiant_intensity: own.intensity,
             projected_area: sums.area,

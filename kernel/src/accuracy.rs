@@ -83,7 +83,9 @@ impl LaneTask for Differences<'_, '_> {
     fn run<L: Lanes>(self, lanes: L) {
         let Differences { system, radiance, reference, range, out } = self;
         let bands = system.shape.bands.clamp(1, MAX_BANDS);
-        let (mut checks, mut light) = ([[0.0; 4]; MAX_BANDS], [0.0; MAX_BANDS]);
+        // one by one: a pair of them would be made elsewhere on the stack and copied
+        let mut checks = [[0.0; 4]; MAX_BANDS];
+        let mut light = [0.0; MAX_BANDS];
         let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
         for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
             sums.fill([0.0; 4]);

@@ -16,8 +16,8 @@ use crate::simd::{Task, run};
 /// Sides of facets beyond which no planes are compared: the table's bits grow with their square.
 pub const MOST: usize = 8192;
 
-/// Words of a set of facets.
-const WORDS: usize = MOST / 64;
+/// Words of a set of sides.
+pub(crate) const WORDS: usize = MOST / 64;
 
 /// Facets that rise before a plane by this share of its facet's extent hide no more than that share of it.
 const SLACK: f64 = 1e-6;
@@ -185,30 +185,47 @@ pub struct Receiver {
 const TRIES: u32 = 64;
 
 /// What a receiver sees that nothing hides: sides of facets, and how many elements they have.
-#[derive(Clone, Copy, Debug)]
-pub struct Clear {
-    proven: [u64; WORDS],
+#[derive(Debug)]
+pub struct Clear<'m> {
+    proven: &'m mut [u64],
     /// Elements of the proven sides.
     pub elements: usize,
     /// True where the receiver can see nothing else.
     pub all: bool,
 }
 
-impl Clear {
-    /// Whether rays need not find a side of a facet.
-    pub fn has(&self, facet: usize, side: usize, sides: usize) -> bool {
-        contains(&self.proven, facet * sides + side)
+impl<'m> Clear<'m> {
+    /// Words of memory for a scene's sides.
+    pub fn words(scene: &Scene<'_>) -> usize {
+        (scene.facets() * scene.sides()).div_ceil(64).min(WORDS)
     }
 
-    /// As [`Clear::new`] where the receiver sees nothing else, facets being counted; none otherwise.
-    pub fn whole(scene: &Scene<'_>, facing: &Facing<'_>, receiver: &Receiver, most: usize) -> Option<Clear> {
+    /// Nothing is proven yet; `memory` has [`Clear::words`] words of any content.
+    pub fn new(memory: &'m mut [u64]) -> Clear<'m> {
+        memory.fill(0);
+        Clear { proven: memory, elements: 0, all: true }
+    }
+
+    /// Whether rays need not find a side of a facet.
+    pub fn has(&self, facet: usize, side: usize, sides: usize) -> bool {
+        contains(self.proven, facet * sides + side)
+    }
+
+    /// As [`Clear::prove`], facets being counted; whether the receiver sees nothing else.
+    pub fn prove_whole(
+        &mut self,
+        scene: &Scene<'_>,
+        facing: &Facing<'_>,
+        receiver: &Receiver,
+        most: usize,
+    ) -> bool {
         // the back of a one-sided facet may show, or is hidden by what no plane tells
         let back = |facet: usize| scene.sides() == 1 && heights(scene, facet, &receiver.corners).0 < -FLAT;
         if facing.is_empty() || facing.before(receiver.facet, receiver.side).any(back) {
-            return None;
+            return false;
         }
-        let clear = Clear::new(scene, facing, receiver, most, |_, _| 1);
-        clear.all.then_some(clear)
+        self.prove(scene, facing, receiver, most, |_, _| 1);
+        self.all
     }
 
     /// How many elements the receiver may see, `count` those of a side of a facet.
@@ -228,14 +245,14 @@ impl Clear {
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
     /// `TRIES` go.
-    pub fn new(
+    pub fn prove(
+        &mut self,
         scene: &Scene<'_>,
         facing: &Facing<'_>,
         receiver: &Receiver,
         most: usize,
         count: impl Fn(usize, usize) -> usize,
-    ) -> Clear {
-        let mut clear = Clear { proven: [0; WORDS], elements: 0, all: true };
+    ) {
         let mut tries = TRIES;
         for facet in facing.before(receiver.facet, receiver.side) {
             let (low, high) = heights(scene, facet, &receiver.corners);
@@ -246,18 +263,17 @@ impl Clear {
                 }
                 let count = count(facet, side);
                 if side < scene.sides()
-                    && clear.elements + count <= most
+                    && self.elements + count <= most
                     && facing.is_alone(facet)
                     && facing.clear(scene, receiver, (facet, side), &mut tries)
                 {
-                    insert(&mut clear.proven, facet * scene.sides() + side);
-                    clear.elements += count;
+                    insert(self.proven, facet * scene.sides() + side);
+                    self.elements += count;
                 } else {
-                    clear.all = false;
+                    self.all = false;
                 }
             }
         }
-        clear
     }
 }
 

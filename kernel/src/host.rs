@@ -610,7 +610,7 @@ impl Host {
         let measure = |memory: &mut Memory, forward: &Vec3| {
             let view = lit.view(&solved, *forward)?;
             let sums = signature::whole(&solved, &view, memory.bytes_mut())?;
-            Ok(lit.signature(*forward, &sums))
+            Ok(lit.signature(*forward, sums))
         };
         self.pool.install(|| forward.par_iter().map_init(|| Memory::new(size), measure).collect())
     }

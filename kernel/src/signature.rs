@@ -1,6 +1,6 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
 
-use crate::arena::{Arena, Need};
+use crate::arena::{Arena, Need, plain_table};
 use crate::bvh::Ahead;
 use crate::camera::Camera;
 use crate::chain::{Outlook, Sample, Solved, Terms, Way, Work};
@@ -65,20 +65,28 @@ impl View {
     }
 }
 
-/// Sums over a row of cells, or over several.
-#[derive(Clone, Copy, Debug)]
-pub struct Sums {
-    /// Projected area, in the caller's square units.
-    pub area: f64,
-    /// Radiant intensity in W/sr, one value per band.
-    pub intensity: [f64; MAX_BANDS],
-    /// Rays traced.
-    pub rays: u64,
+plain_table! {
+    /// Sums over a row of cells, or over several.
+    pub struct Sums {
+        /// Projected area, in the caller's square units.
+        pub area: f64,
+        /// Radiant intensity in W/sr, one value per band.
+        pub intensity: [f64; MAX_BANDS],
+        /// Rays traced.
+        pub rays: u64,
+    }
 }
 
 impl Sums {
     /// Nothing yet.
     pub const ZERO: Sums = Sums { area: 0.0, intensity: [0.0; MAX_BANDS], rays: 0 };
+
+    /// Back to nothing.
+    fn clear(&mut self) {
+        self.area = 0.0;
+        self.intensity.fill(0.0);
+        self.rays = 0;
+    }
 
     /// Adds the next row.
     pub fn add(&mut self, next: &Sums) {
@@ -97,9 +105,9 @@ const FACETS: usize = 2;
 /// Facets less far apart on a row, in cells, touch.
 const GAP: f64 = 1e-9;
 
-/// Bytes of scratch memory for [`rows`].
+/// Bytes of scratch memory for [`rows`] and [`whole`].
 pub fn scratch_bytes() -> Result<usize, Error> {
-    let need = Need::new().and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
+    let need = Need::new().and::<Sums>(2).and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
     Lines::need(need, TOGETHER).bytes()
 }
 
@@ -121,32 +129,32 @@ pub fn rows(
         return Err(Error::Length { what: "signature rows", expected: range.len(), given: out.len() });
     }
     let mut out = out.iter_mut();
-    each_row(solved, view, range, scratch, |sums| {
+    each_row(solved, view, range, scratch, |_, sums| {
         if let Some(out) = out.next() {
             *out = *sums;
         }
-    })
+    })?;
+    Ok(())
 }
 
-/// The sums over all cells: those of all [`rows`], added in their order.
-pub fn whole(solved: &Solved<'_>, view: &View, scratch: &mut [u8]) -> Result<Sums, Error> {
-    let mut all = Sums::ZERO;
-    each_row(solved, view, 0..view.rows(), scratch, |sums| all.add(sums))?;
-    Ok(all)
+/// The sums over all cells: those of all [`rows`], added in their order. They stand in the scratch memory.
+pub fn whole<'s>(solved: &Solved<'_>, view: &View, scratch: &'s mut [u8]) -> Result<&'s Sums, Error> {
+    each_row(solved, view, 0..view.rows(), scratch, |all, sums| all.add(sums))
 }
 
-/// Calls `each` with the sums over row after row.
-fn each_row(
+/// Calls `each` with what it made of the rows before, at first nothing, and the sums over row after row.
+fn each_row<'s>(
     solved: &Solved<'_>,
     view: &View,
     range: Range<usize>,
-    scratch: &mut [u8],
-    mut each: impl FnMut(&Sums),
-) -> Result<(), Error> {
+    scratch: &'s mut [u8],
+    mut each: impl FnMut(&mut Sums, &Sums),
+) -> Result<&'s Sums, Error> {
     let given = scratch.len();
     let needed = scratch_bytes()?;
     let mut arena = Arena::new(scratch, needed)?;
     let short = Error::BufferTooSmall { needed, given };
+    let [all, sums] = arena.take::<Sums>(2)? else { return Err(short) };
     let terms = arena.take::<Terms>(1)?.first_mut().ok_or(short)?;
     let work = arena.take::<Work>(1)?.first_mut().ok_or(short)?;
     let ways = arena.take::<Way>(Outlook::ROOM)?;
@@ -159,18 +167,18 @@ fn each_row(
     let samples = !own || flat || solved.scene.facets() / FACETS > view.cells * view.cells;
     let (mut next, end) = (range.start, range.end);
     for row in range {
-        let mut sums = Sums::ZERO;
+        sums.clear();
         if row == next && !samples {
             next = end.min(row + TOGETHER);
             lines.find(solved.bvh, &view.samples, view.cells, row as isize..next as isize);
         }
         match lines.of(row as isize) {
-            Some(spans) if !samples => tracer.spans(row, spans, &mut sums),
-            _ => tracer.sample(row, &mut sums),
+            Some(spans) if !samples => tracer.spans(row, spans, sums),
+            _ => tracer.sample(row, sums),
         }
-        each(&sums);
+        each(all, sums);
     }
-    Ok(())
+    Ok(all)
 }
 
 struct Tracer<'a> {
@@ -201,6 +209,8 @@ impl Tracer<'_> {
     }
 
     /// Adds what a row shows, piece by piece without gaps: rays a cell apart or less stand for equal parts of each.
+    // apart: it does not burden the stack of the search for facets on a line, nor that its own
+    #[inline(never)]
     fn spans(&mut self, row: usize, mut spans: impl Iterator<Item = Span> + Clone, sums: &mut Sums) {
         // another place within the parts of each row: facets may be as regular as the cells
         let (place, _) = Sequence::new(0x5160).pair(row as u32, 0);

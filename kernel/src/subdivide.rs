@@ -8,7 +8,7 @@
 use crate::arena::{Arena, Need, plain_struct};
 use crate::bvh::{Ahead, Bvh};
 use crate::error::Error;
-use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
+use crate::facing::{Clear, FLAT, Facing, Receiver, WORDS, heights};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::index::{Index, IndexMut, span};
 use crate::math::{Vec3, frame};
@@ -358,7 +358,11 @@ impl Probe<'_> {
             Surface::new(self.scene, facet, side, u, v).point
         });
         let receiver = Receiver { facet, side, normal, corners };
-        let clear = Clear::whole(self.scene, self.facing, &receiver, MOST_CLOSED)?;
+        let mut proven = [0; WORDS];
+        let mut clear = Clear::new(&mut proven);
+        if !clear.prove_whole(self.scene, self.facing, &receiver, MOST_CLOSED) {
+            return None;
+        }
         let mut sums = [1.0; POINTS];
         let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
         let base = corners[0].dot(normal);

@@ -11,7 +11,7 @@ use super::{BLOCKED, Record};
 use crate::element::Elements;
 use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
-use crate::index::Index;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, clamp, fabs, pow, sqrt};
 use crate::quarter::{self, QUARTERS};
 use crate::scene::{NO_MIRROR, Scene};
@@ -86,6 +86,22 @@ struct Target {
     mirror: Option<usize>,
 }
 
+impl Target {
+    /// What all elements of a side of a facet have in common.
+    fn side(scene: &Scene<'_>, facet: usize, side: usize) -> Target {
+        let material = scene.material(facet);
+        let glows = scene.diffuse(material).iter().chain(scene.emission(material)).any(|&x| x > 0.0);
+        let mirror = mirror_kind(scene.mirror(material));
+        Target { unknown: 0, corners: [Vec3::ZERO; 3], normal: scene.side_normal(facet, side), glows, mirror }
+    }
+
+    /// One of them.
+    fn element(self, scene: &Scene<'_>, elements: &Elements<'_>, unknown: usize) -> Target {
+        let corners = elements.corners(scene, unknown / scene.sides().max(1));
+        Target { unknown, corners, ..self }
+    }
+}
+
 /// The elements of a side of a facet.
 fn targets<'a>(
     scene: &'a Scene<'a>,
@@ -93,26 +109,16 @@ fn targets<'a>(
     facet: usize,
     side: usize,
 ) -> impl Iterator<Item = Target> + use<'a> {
-    let material = scene.material(facet);
-    let glows = scene.diffuse(material).iter().chain(scene.emission(material)).any(|&x| x > 0.0);
-    let mirror = mirror_kind(scene.mirror(material));
-    let normal = scene.side_normal(facet, side);
-    elements.unknowns_of(facet, side).map(move |unknown| {
-        let corners = elements.corners(scene, unknown / scene.sides().max(1));
-        Target { unknown, corners, normal, glows, mirror }
-    })
+    let of = Target::side(scene, facet, side);
+    elements.unknowns_of(facet, side).map(move |unknown| of.element(scene, elements, unknown))
 }
 
-/// Elements that one rule serves, until they fill all lanes.
+/// Elements that one rule serves, until they fill all lanes: their unknowns alone, since all that is known of them would
+/// take a few kilobytes of stack.
+#[derive(Clone, Copy)]
 struct Lanes {
-    block: TriangleBlock,
-    targets: [Option<Target>; LANES],
+    unknowns: [u32; LANES],
     count: usize,
-}
-
-impl Lanes {
-    // a constant: arrays of it are made where they stand, without a copy on the stack
-    const EMPTY: Lanes = Lanes { block: TriangleBlock::EMPTY, targets: [None; LANES], count: 0 };
 }
 
 /// Mirrors whose rays are told apart: classes beyond share a kind with others.
@@ -175,49 +181,64 @@ struct Blocked {
 
 impl Entries<'_, '_> {
     /// Adds the entries of all that is proven to be clear. `None` where the memory is full.
-    // apart: its lanes do not burden the stack of rays
+    // apart, as what follows: none burdens the stack of another
     #[inline(never)]
-    pub fn add(mut self, receiver: &Receiver, facing: &Facing<'_>, clear: &Clear) -> Option<Known> {
+    pub fn add(
+        mut self,
+        receiver: &Receiver,
+        facing: &Facing<'_>,
+        clear: &Clear<'_>,
+        known: &mut Known,
+    ) -> Option<()> {
         // a small part of the error of rays, 0.9 n^-2/3
         let error = 0.05 * pow(f64::from(self.rays), -2.0 / 3.0);
         let rules = Rules::new(error);
         let quarters = [0, 1, 2, 3].map(|q| part_of(&receiver.corners, q));
         let place = Place { receiver, quarters, rules, middle: middle(&receiver.corners) };
-        let mut lanes = [Lanes::EMPTY; 3];
-        let (mut known, mut blocked) = (Known::default(), Blocked::default());
+        let mut lanes = [Lanes { unknowns: [0; LANES], count: 0 }; 3];
+        let mut blocked = Blocked::default();
         let sides = self.scene.sides();
         for facet in facing.before(receiver.facet, receiver.side) {
             for side in (0..sides).filter(|&side| clear.has(facet, side, sides)) {
                 for target in targets(self.scene, self.elements, facet, side) {
                     let Some(class) = place.class(self.scene, facet, side, &target) else {
-                        let factors = place.quarters.map(|q| place.mean(&q, &target, 0));
-                        known.add(&target, &factors);
-                        self.entry(&place, &target, factors, true, &mut blocked)?;
+                        self.near(&place, &target, (known, &mut blocked))?;
                         continue;
                     };
                     let Some(lanes) = lanes.get_mut(class) else { continue };
-                    lanes.block.set(lanes.count, &target.corners);
-                    if let Some(slot) = lanes.targets.get_mut(lanes.count) {
-                        *slot = Some(target);
-                    }
+                    lanes.unknowns.set(lanes.count, target.unknown as u32);
                     lanes.count += 1;
                     if lanes.count == LANES {
-                        self.flush(&place, class, lanes, (&mut known, &mut blocked))?;
+                        self.flush(&place, class, lanes, (known, &mut blocked))?;
                     }
                 }
             }
         }
         for (class, lanes) in lanes.iter_mut().enumerate() {
-            self.flush(&place, class, lanes, (&mut known, &mut blocked))?;
+            self.flush(&place, class, lanes, (known, &mut blocked))?;
         }
         self.block(&blocked)?;
         if clear.all {
             known.close(error);
         }
-        Some(known)
+        Some(())
+    }
+
+    /// Adds an element that no rule serves as it is.
+    #[inline(never)]
+    fn near(
+        &mut self,
+        place: &Place<'_>,
+        target: &Target,
+        (known, blocked): (&mut Known, &mut Blocked),
+    ) -> Option<()> {
+        let factors = place.quarters.each_ref().map(|q| place.mean(q, target, 0));
+        known.add(target, &factors);
+        self.entry(place, target, factors, true, blocked)
     }
 
     /// Evaluates the elements of one rule.
+    #[inline(never)]
     fn flush(
         &mut self,
         place: &Place<'_>,
@@ -225,32 +246,46 @@ impl Entries<'_, '_> {
         lanes: &mut Lanes,
         (known, blocked): (&mut Known, &mut Blocked),
     ) -> Option<()> {
+        let unknowns = lanes.unknowns.head(lanes.count);
+        lanes.count = 0;
+        if unknowns.is_empty() {
+            return Some(());
+        }
+        let means = self.means(place, class, unknowns);
+        for (lane, &unknown) in unknowns.iter().enumerate() {
+            let (facet, side) = self.elements.facet_of(unknown as usize);
+            let target =
+                Target::side(self.scene, facet, side).element(self.scene, self.elements, unknown as usize);
+            let factors = means.each_ref().map(|of| of.at(lane));
+            known.add(&target, &factors);
+            self.entry(place, &target, factors, false, blocked)?;
+        }
+        Some(())
+    }
+
+    /// What each of the receiver's quarters sees of these elements, by a rule.
+    #[inline(never)]
+    fn means(&self, place: &Place<'_>, class: usize, unknowns: &[u32]) -> [[f64; LANES]; QUARTERS] {
         let rule: &[(f64, f64, f64)] = match class {
             0 => &ONE,
             1 => &THREE,
             _ => &SIX,
         };
-        let mut means = [[0.0; LANES]; QUARTERS];
-        if lanes.count == 0 {
-            return Some(());
+        let mut block = TriangleBlock::EMPTY;
+        for (lane, &unknown) in unknowns.iter().enumerate() {
+            block.set(lane, &self.elements.corners(self.scene, unknown as usize / self.scene.sides().max(1)));
         }
+        let mut means = [[0.0; LANES]; QUARTERS];
         for (quarter, means) in place.quarters.iter().zip(&mut means) {
             for &(u, v, weight) in rule {
                 let mut factors = [[0.0; LANES]];
                 let point = crate::element::point(quarter, u, v);
-                let block = core::slice::from_ref(&lanes.block);
+                let block = core::slice::from_ref(&block);
                 point_to_triangles(self.isa, point, place.receiver.normal, block, &mut factors);
                 means.iter_mut().zip(factors[0]).for_each(|(mean, factor)| *mean += weight * factor);
             }
         }
-        for (lane, target) in lanes.targets.iter_mut().take(lanes.count).enumerate() {
-            let Some(target) = target.take() else { continue };
-            let factors = means.each_ref().map(|of| of.at(lane));
-            known.add(&target, &factors);
-            self.entry(place, &target, factors, false, blocked)?;
-        }
-        lanes.count = 0;
-        Some(())
+        means
     }
 
     /// Adds one entry, by what the receiver's quarters see of the target.

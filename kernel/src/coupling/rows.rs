@@ -18,6 +18,7 @@ use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
+use crate::arena::{Arena, Need};
 use crate::bvh::{Bvh, GROUP};
 use crate::element::Elements;
 use crate::error::Error;
@@ -102,6 +103,9 @@ const OVERFULL: f64 = 0.02;
 const MOST_FACTOR: f64 = 2.0;
 const LEAST_FACTOR: f64 = 0.25;
 
+/// Rays that meet their first facets together: few where the stack is small.
+const TOGETHER: usize = if cfg!(feature = "std") { GROUP } else { 4 };
+
 /// The fewest rays of a row.
 const FEWEST: u32 = 64;
 
@@ -169,10 +173,19 @@ pub fn fill(
     memory: &mut [u8],
 ) -> Result<usize, Error> {
     let given = memory.len();
-    let sink = Sink::new(&range, scene.bands(), settings.directional, memory)?;
+    // the set of what is clear stands behind the block
+    let words = if facing.is_empty() || settings.directional { 0 } else { Clear::words(scene) };
+    let room = if words > 0 { Need::new().and::<u64>(words).bytes()? } else { 0 };
+    let short = |needed: usize| Error::BufferTooSmall { needed: needed.saturating_add(room), given };
+    let (memory, behind) = memory.split_at_mut_checked(given.saturating_sub(room)).ok_or(short(0))?;
+    let sink = match Sink::new(&range, scene.bands(), settings.directional, memory) {
+        Err(Error::BufferTooSmall { needed, .. }) => return Err(short(needed)),
+        sink => sink?,
+    };
+    let proven = if words > 0 { Arena::new(behind, room)?.take::<u64>(words)? } else { &mut [] };
     let wanted = range.len();
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
-    let mut tracer = Tracer { scene, bvh, elements, facing, settings, mean_area, sink };
+    let mut tracer = Tracer { scene, bvh, elements, facing, settings, mean_area, sink, proven };
     for unknown in range {
         if tracer.row(unknown).is_none() {
             tracer.sink.drop_row();
@@ -193,6 +206,8 @@ struct Tracer<'a, 'm> {
     settings: &'a RowSettings,
     mean_area: f64,
     sink: Sink<'m>,
+    /// Memory of [`Clear`].
+    proven: &'m mut [u64],
 }
 
 /// Where the rays of a row start.
@@ -297,55 +312,66 @@ impl Tracer<'_, '_> {
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
         let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
-        let tally = match self.closed(&start, normal, most)? {
-            Some(tally) => tally,
-            None => self.sampled(&start, most)?,
-        };
+        let mut tally = Tally::default();
+        let proven = core::mem::take(&mut self.proven);
+        let closed = self.closed(&start, normal, most, proven, &mut tally);
+        self.proven = proven;
+        if !closed? {
+            self.sampled(&start, most, &mut tally)?;
+        }
         self.end_row(&tally);
         Some(())
     }
 
     /// The row by rays alone.
     #[inline(never)]
-    fn sampled(&mut self, start: &Start, most: u32) -> Option<Tally> {
-        let tally = self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None)?;
+    fn sampled(&mut self, start: &Start, most: u32, tally: &mut Tally) -> Option<()> {
+        self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None, tally)?;
         let mixed = tally.mixed();
         if self.scene.sides() == 1 && mixed.contains(&true) {
             self.sink.drop_row();
-            return self.rays(start, (FEWEST.max(most / 16), most), mixed, None);
+            self.rays(start, (FEWEST.max(most / 16), most), mixed, None, tally)?;
         }
-        Some(tally)
+        Some(())
     }
 
-    /// The row with entries in closed form to what nothing hides, and rays for the rest; the inner value is none where
-    /// rays alone cost less, or where parts of the element may lie inside a body.
+    /// The row with entries in closed form to what nothing hides, and rays for the rest; false where rays alone cost
+    /// less, or where parts of the element may lie inside a body.
     // apart, as the next: what one needs does not burden the stack of the other
     #[inline(never)]
-    fn closed(&mut self, start: &Start, normal: Vec3, most: u32) -> Option<Option<Tally>> {
+    fn closed(
+        &mut self,
+        start: &Start,
+        normal: Vec3,
+        most: u32,
+        proven: &mut [u64],
+        tally: &mut Tally,
+    ) -> Option<bool> {
         if self.settings.directional {
             // what is hidden of a sky that varies has to be known by direction: rays tell that, and the rest with it
-            return Some(None);
+            return Some(false);
         }
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
         let limit = (2 * most as usize).min(MOST_CLOSED);
         let possible = Clear::possible(self.scene, self.facing, &receiver, count);
-        if possible == 0 || possible > limit || !self.is_worth(start, possible, most)? {
-            return Some(None);
+        if possible == 0 || possible > limit || !self.is_worth(start, possible, most, tally)? {
+            return Some(false);
         }
-        let clear = Clear::new(self.scene, self.facing, &receiver, limit, count);
-        let mut tally = Tally::default();
+        let mut clear = Clear::new(proven);
+        clear.prove(self.scene, self.facing, &receiver, limit, count);
+        *tally = Tally::default();
         if !clear.all || self.scene.largest_specular() > 0.0 {
-            tally = self.rays(start, (FEWEST, most), [false; BINS], Some(&clear))?;
+            self.rays(start, (FEWEST, most), [false; BINS], Some(&clear), tally)?;
             if tally.backs.iter().any(|b| *b > 0) {
                 self.sink.drop_row();
-                return Some(None);
+                return Some(false);
             }
         }
         if clear.elements == 0 {
             self.sink.drop_row();
-            return Some(None);
+            return Some(false);
         }
         let all = [true; PARTS];
         let entries = Entries {
@@ -357,23 +383,22 @@ impl Tracer<'_, '_> {
             slopes: slopes(all),
             departures: departures(all),
         };
-        tally.known = entries.add(&receiver, self.facing, &clear)?;
+        entries.add(&receiver, self.facing, &clear, &mut tally.known)?;
         if tally.known.share() > 1.0 + OVERFULL {
             self.sink.drop_row();
-            return Some(None);
+            return Some(false);
         }
-        Some(Some(tally))
+        Some(true)
     }
 
     /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
-    fn is_worth(&mut self, start: &Start, entries: usize, most: u32) -> Option<bool> {
+    fn is_worth(&mut self, start: &Start, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
         if entries <= FEWEST as usize {
             return Some(true);
         }
-        let mut tally = Tally::default();
         while tally.rays < FEWEST {
-            let count = (FEWEST - tally.rays).min(GROUP as u32);
-            self.batch(start, &mut tally, count, None)?;
+            let count = (FEWEST - tally.rays).min(TOGETHER as u32);
+            self.batch(start, tally, count, None)?;
         }
         self.sink.drop_row();
         let wanted = enough(most, tally.rays, f64::from(tally.blocked));
@@ -387,14 +412,15 @@ impl Tracer<'_, '_> {
         start: &Start,
         (fewest, most): (u32, u32),
         apart: [bool; BINS],
-        clear: Option<&Clear>,
-    ) -> Option<Tally> {
-        let mut tally = Tally { apart, ..Tally::default() };
+        clear: Option<&Clear<'_>>,
+        tally: &mut Tally,
+    ) -> Option<()> {
+        *tally = Tally { apart, ..Tally::default() };
         let rho = self.scene.largest_specular();
         let mut goal = fewest.min(most);
         while tally.rays < goal {
-            let count = (goal - tally.rays).min(GROUP as u32);
-            self.batch(start, &mut tally, count, clear)?;
+            let count = (goal - tally.rays).min(TOGETHER as u32);
+            self.batch(start, tally, count, clear)?;
             if tally.rays == goal {
                 // what a mirror shows counts with its reflectance
                 goal = enough(
@@ -404,7 +430,7 @@ impl Tracer<'_, '_> {
                 );
             }
         }
-        Some(tally)
+        Some(())
     }
 
     /// Rays of an element of so much area: the image's mean square error, the sum of a n^-4/3 over all elements, is least
@@ -476,10 +502,16 @@ impl Tracer<'_, '_> {
     }
 
     /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
-    fn batch(&mut self, start: &Start, tally: &mut Tally, count: u32, clear: Option<&Clear>) -> Option<()> {
-        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
-        let mut bins = [0; GROUP];
-        let mut hits = [None; GROUP];
+    fn batch(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        count: u32,
+        clear: Option<&Clear<'_>>,
+    ) -> Option<()> {
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); TOGETHER];
+        let mut bins = [0; TOGETHER];
+        let mut hits = [None; TOGETHER];
         let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
         for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
             (*ray, *bin) = self.ray(start, number);
@@ -516,7 +548,7 @@ impl Tracer<'_, '_> {
         tally: &mut Tally,
         (mut ray, mut met): (Ray, Option<Hit>),
         bin: usize,
-        clear: Option<&Clear>,
+        clear: Option<&Clear<'_>>,
     ) -> Option<()> {
         let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
         let sequence = &start.sequences[part];

@@ -4,6 +4,7 @@ use super::word::{EMPTY, Word, Words};
 use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
 use crate::arena::{ALIGNMENT, Arena, Need};
 use crate::error::Error;
+use crate::facing::WORDS;
 use crate::index::{Index, IndexMut};
 use crate::scene::Scene;
 use crate::sort;
@@ -15,7 +16,8 @@ use core::ops::Range;
 pub fn bytes(rows: usize, records: usize, unmerged: usize, bands: usize) -> Result<usize, Error> {
     let all = rows.saturating_mul(records).saturating_add(unmerged);
     let capacity = word_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
-    fixed(rows, capacity, bands).and::<Record>(all).bytes()
+    // behind the block, a set of sides while rows are made
+    fixed(rows, capacity, bands).and::<Record>(all).and::<u64>(2 * ALIGNMENT / 8 + WORDS).bytes()
 }
 
 /// Words that a block of so many bytes has room for: 1/16 of it.

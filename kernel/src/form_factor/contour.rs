@@ -44,41 +44,45 @@ struct Integrand {
 }
 
 /// The double integral of ln r over the contours of both polygons, whose extent is about 1.
+#[inline(never)]
 pub(super) fn integral(isa: Isa, outer: &Convex, inner: &Convex) -> f64 {
+    let nothing = Edge { start: Vec3::ZERO, direction: Vec3::ZERO, length: 0.0, weight: 0.0 };
+    let mut integrand = Integrand {
+        isa,
+        start: Vec3::ZERO,
+        side: Vec3::ZERO,
+        inner: [nothing; CAPACITY],
+        corners: inner.corners().len(),
+        singular: [Singular { t: 0.0, h: 0.0 }; 2 * CAPACITY],
+        singulars: 0,
+    };
     let mut sum = 0.0;
     for (start, end) in edges(outer.corners()) {
         let side = end - start;
         let length = sqrt(side.dot(side));
         if length > 0.0 {
-            sum += length * Integrand::new(isa, start, side, length, inner).panel(0.0, 1.0);
+            integrand.along(start, side, length, inner);
+            sum += length * integrand.panel(0.0, 1.0);
         }
     }
     sum
 }
 
 impl Integrand {
-    fn new(isa: Isa, start: Vec3, side: Vec3, length: f64, polygon: &Convex) -> Integrand {
+    /// For an edge of the outer polygon.
+    fn along(&mut self, start: Vec3, side: Vec3, length: f64, polygon: &Convex) {
         let direction = side / length;
-        let nothing = Edge { start: Vec3::ZERO, direction: Vec3::ZERO, length: 0.0, weight: 0.0 };
-        let mut this = Integrand {
-            isa,
-            start,
-            side,
-            inner: [nothing; CAPACITY],
-            corners: polygon.corners().len(),
-            singular: [Singular { t: 0.0, h: 0.0 }; 2 * CAPACITY],
-            singulars: 0,
-        };
-        for (slot, (a, b)) in this.inner.iter_mut().zip(edges(polygon.corners())) {
-            let length = sqrt((b - a).dot(b - a));
-            let along = if length > 0.0 { (b - a) / length } else { Vec3::ZERO };
-            *slot = Edge { start: a, direction: along, length, weight: along.dot(direction) };
+        (self.start, self.side, self.singulars) = (start, side, 0);
+        for (k, (a, b)) in edges(polygon.corners()).enumerate() {
+            let inner = sqrt((b - a).dot(b - a));
+            let along = if inner > 0.0 { (b - a) / inner } else { Vec3::ZERO };
+            let edge = Edge { start: a, direction: along, length: inner, weight: along.dot(direction) };
+            if let Some(slot) = self.inner.get_mut(k) {
+                *slot = edge;
+            }
+            self.add_corner(&edge, direction, length);
+            self.add_line(&edge, direction, length);
         }
-        for k in this.inner.into_iter().take(this.corners) {
-            this.add_corner(&k, direction, length);
-            this.add_line(&k, direction, length);
-        }
-        this
     }
 
     /// ln r is singular where the outer edge meets a corner.

@@ -2,7 +2,7 @@
 
 use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
-use super::patch::{Patch, patches};
+use super::patch::{Patch, Way, patches};
 use super::rule::Rule;
 use crate::math::{FRAC_1_PI, Vec3, sqrt, unit};
 use crate::simd::Isa;
@@ -94,6 +94,8 @@ pub(super) fn fronts(a: &Convex, b: &Convex) -> Option<(Convex, Convex)> {
 }
 
 /// Exchange area of two pieces whose extent is about 1.
+// apart, as the two ways that it may go: none burdens the stack of another
+#[inline(never)]
 fn exchange(isa: Isa, a: &Convex, b: &Convex) -> f64 {
     let (Some(na), Some(nb)) = (unit(double_area(a.corners())), unit(double_area(b.corners()))) else {
         return 0.0;
@@ -113,43 +115,50 @@ fn exchange(isa: Isa, a: &Convex, b: &Convex) -> f64 {
 
 /// The area form, free of cancellation: over all patches of both polygons, split until far enough apart; none
 /// where that takes more than `splits` splits, which is found before any is computed: polygons that touch never do.
+#[inline(never)]
 fn by_area(a: &Convex, na: Vec3, b: &Convex, nb: Vec3, splits: u32) -> Option<f64> {
     let pairs = || patches(a.corners()).flat_map(|p| patches(b.corners()).map(move |q| (p, q)));
     let mut left = splits;
     for (p, q) in pairs() {
-        split(&p, &q, DEPTH, &mut left, &mut |_, _, _| {})?;
+        split(&p, &q, &mut left, &mut |_, _, _| {})?;
     }
     let (mut left, mut sum) = (splits, 0.0);
     for (p, q) in pairs() {
-        split(&p, &q, DEPTH, &mut left, &mut |p, q, rule| sum += Patch::product(p, na, q, nb, rule))?;
+        split(&p, &q, &mut left, &mut |p, q, rule| sum += Patch::product(p, na, q, nb, rule))?;
     }
     Some(sum)
 }
 
 /// Halves two patches until each pair of parts is far enough apart for a rule, and gives those to `work`; none where that
 /// takes too many splits.
-fn split(
-    a: &Patch,
-    b: &Patch,
-    depth: u32,
-    left: &mut u32,
-    work: &mut impl FnMut(&Patch, &Patch, Rule),
-) -> Option<()> {
-    if let Some(rule) = Patch::rule(a, b) {
-        work(a, b, rule);
-        return Some(());
+///
+/// Lower halves first. What waits is not kept on a stack: the way to a part, upper or lower half by level, says how to get
+/// it from the whole.
+fn split(a: &Patch, b: &Patch, left: &mut u32, work: &mut impl FnMut(&Patch, &Patch, Rule)) -> Option<()> {
+    let (mut p, mut q) = (*a, *b);
+    let mut way = Way::default();
+    loop {
+        if let Some(rule) = Patch::rule(&p, &q) {
+            work(&p, &q, rule);
+            if !way.next() {
+                return Some(());
+            }
+            (p, q) = (*a, *b);
+            way.steps().for_each(|upper| halve(&mut p, &mut q, upper));
+        } else {
+            *left = left.checked_sub(1)?;
+            if !way.down(DEPTH) {
+                return None;
+            }
+            halve(&mut p, &mut q, false);
+        }
     }
-    *left = left.checked_sub(1)?;
-    let depth = depth.checked_sub(1)?;
-    if a.size() >= b.size() {
-        let (lower, upper) = a.halves();
-        split(&lower, b, depth, left, work)?;
-        split(&upper, b, depth, left, work)
-    } else {
-        let (lower, upper) = b.halves();
-        split(a, &lower, depth, left, work)?;
-        split(a, &upper, depth, left, work)
-    }
+}
+
+/// Puts a half in the place of the larger patch.
+fn halve(a: &mut Patch, b: &mut Patch, upper: bool) {
+    let larger = if a.size() >= b.size() { a } else { b };
+    *larger = larger.half(upper);
 }
 
 /// Sum of the sides.

@@ -30,6 +30,65 @@ struct Points {
     weight: [f64; LANES],
 }
 
+impl Points {
+    const NONE: Points = Points { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], weight: [0.0; LANES] };
+}
+
+/// The way from a whole to a part of it that was halved again and again, and on to the next part: lower halves first.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Way {
+    /// Bit n: whether step n leads to the upper half.
+    upper: u32,
+    steps: u32,
+}
+
+impl Way {
+    /// On to the lower half; false where that is more than so many steps, at most 32.
+    pub(super) fn down(&mut self, most: u32) -> bool {
+        if self.steps >= most {
+            return false;
+        }
+        self.upper &= !(1 << self.steps);
+        self.steps += 1;
+        true
+    }
+
+    /// From an upper half back to the whole that it is of; false from a lower half, or where there is none.
+    pub(super) fn up(&mut self) -> bool {
+        let last = self.steps.wrapping_sub(1);
+        let upper = self.steps > 0 && self.upper >> last & 1 == 1;
+        if upper {
+            self.steps = last;
+        }
+        upper
+    }
+
+    /// From a lower half to the upper one beside it; false where there is none.
+    pub(super) fn across(&mut self) -> bool {
+        if self.steps > 0 {
+            self.upper |= 1 << (self.steps - 1);
+        }
+        self.steps > 0
+    }
+
+    /// The next part beside or above, in order; false after the last.
+    pub(super) fn next(&mut self) -> bool {
+        while self.up() {}
+        self.across()
+    }
+
+    /// Steps from the whole.
+    pub(super) fn depth(&self) -> u32 {
+        self.steps
+    }
+
+    /// Whether each step leads to the upper half.
+    pub(super) fn steps(&self) -> impl Iterator<Item = bool> + use<> {
+        let Way { upper, steps } = *self;
+        (0..steps).map(move |n| upper >> n & 1 == 1)
+    }
+}
+
 /// Cuts a convex polygon into a fan of patches.
 pub(super) fn patches(corners: &[Vec3]) -> impl Iterator<Item = Patch> + Clone + '_ {
     let (apex, rest) = corners.split_first().map_or((Vec3::ZERO, &[][..]), |(a, r)| (*a, r));
@@ -73,43 +132,72 @@ impl Patch {
         }
     }
 
+    /// One of the two halves.
+    pub(super) fn half(&self, upper: bool) -> Patch {
+        let (lower, higher) = self.halves();
+        if upper { higher } else { lower }
+    }
+
     /// int int cos cos' / (pi r^2) over both patches, of unit normals `na` and `nb` that face each other.
     ///
     /// r cos is the height of one point over the other's plane, and does not depend on where the other is.
+    #[inline(never)]
     pub(super) fn product(a: &Patch, na: Vec3, b: &Patch, nb: Vec3, rule: Rule) -> f64 {
-        let (on_a, on_b) = (a.points(na, b, nb, rule), b.points(nb, a, na, rule));
+        let mut on_b = [Points::NONE; BLOCKS];
+        b.points(nb, a, na, rule, &mut on_b);
         let blocks = (rule.len() * rule.len()).div_ceil(LANES);
         let mut sums = [0.0; LANES];
-        for s in on_a.iter().take(blocks) {
-            for (((x, y), z), weight) in s.x.iter().zip(s.y).zip(s.z).zip(s.weight) {
-                let mut row = [0.0; LANES];
-                for t in on_b.iter().take(blocks) {
-                    for (lane, sum) in row.iter_mut().enumerate() {
-                        let (dx, dy, dz) = (t.x[lane] - x, t.y[lane] - y, t.z[lane] - z);
-                        let r2 = dx * dx + dy * dy + dz * dz;
-                        *sum += t.weight[lane] / (r2 * r2);
-                    }
+        for (position, weight) in a.weighed(na, b, nb, rule) {
+            let [x, y, z] = position.to_array();
+            let mut row = [0.0; LANES];
+            for t in on_b.iter().take(blocks) {
+                for (lane, sum) in row.iter_mut().enumerate() {
+                    let (dx, dy, dz) = (t.x[lane] - x, t.y[lane] - y, t.z[lane] - z);
+                    let r2 = dx * dx + dy * dy + dz * dz;
+                    *sum += t.weight[lane] / (r2 * r2);
                 }
-                sums.iter_mut().zip(row).for_each(|(sum, r)| *sum += weight * r);
             }
+            sums.iter_mut().zip(row).for_each(|(sum, r)| *sum += weight * r);
         }
         let [p, q, r, s] = sums;
         ((p + q) + (r + s)) * FRAC_1_PI
     }
 
-    /// The rule's points on this patch, weighed by their height over the `other`.
-    fn points(&self, normal: Vec3, other: &Patch, other_normal: Vec3, rule: Rule) -> [Points; BLOCKS] {
-        let [Vec3 { x, y, z }, base] = [self.corners[0], other.corners[0]];
-        let none = Points { x: [x; LANES], y: [y; LANES], z: [z; LANES], weight: [0.0; LANES] };
-        let mut blocks = [none; BLOCKS];
+    /// The rule's points on this patch, weighed by their height over the `other`, in blocks.
+    fn points(
+        &self,
+        normal: Vec3,
+        other: &Patch,
+        other_normal: Vec3,
+        rule: Rule,
+        blocks: &mut [Points; BLOCKS],
+    ) {
+        let Vec3 { x, y, z } = self.corners[0];
+        blocks.fill(Points { x: [x; LANES], y: [y; LANES], z: [z; LANES], weight: [0.0; LANES] });
         let lanes =
             blocks.iter_mut().flat_map(|p| p.x.iter_mut().zip(&mut p.y).zip(&mut p.z).zip(&mut p.weight));
-        for ((((x, y), z), weight), (position, area)) in lanes.zip(self.nodes(normal, rule)) {
+        for ((((x, y), z), weight), (position, own)) in
+            lanes.zip(self.weighed(normal, other, other_normal, rule))
+        {
             (*x, *y, *z) = position.into();
-            // Below zero by rounding alone: the polygons were cut at each other's planes.
-            *weight = area * (position - base).dot(other_normal).max(0.0);
+            *weight = own;
         }
-        blocks
+    }
+
+    /// The rule's points on this patch, each with the area that it stands for times its height over the `other`.
+    fn weighed(
+        &self,
+        normal: Vec3,
+        other: &Patch,
+        other_normal: Vec3,
+        rule: Rule,
+    ) -> impl Iterator<Item = (Vec3, f64)> + use<> {
+        let base = other.corners[0];
+        // Below zero by rounding alone: the polygons were cut at each other's planes.
+        let weigh = move |(position, area): (Vec3, f64)| {
+            (position, area * (position - base).dot(other_normal).max(0.0))
+        };
+        self.nodes(normal, rule).map(weigh)
     }
 
     /// The rule's points on this patch of unit normal `normal`, with the area that each stands for.

@@ -2,10 +2,11 @@
 
 use super::convex::{Convex, double_area, edges, pieces};
 use super::pair::{fronts, polygon_to_polygon};
-use super::patch::{Patch, patches};
+use super::patch::{Patch, Way, patches};
 use super::point::point_to_polygon;
 use super::rule::GAUSS_3;
 use crate::error::Error;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, clamp, sqrt, unit};
 
 /// Rounding of a height, as a share of the distance.
@@ -82,12 +83,30 @@ pub fn visible_polygon_to_polygon(
     tolerance: f64,
     scratch: &mut [Convex],
 ) -> Result<Estimate, Error> {
-    let (area, unobstructed) = (double_area(a), polygon_to_polygon(a, b));
-    let size = 0.5 * sqrt(area.dot(area));
-    let (Some(normal), true) = (unit(area), unobstructed > 0.0) else {
+    let unobstructed = polygon_to_polygon(a, b);
+    if unobstructed <= 0.0 {
         return Ok(Estimate { value: 0.0, error: 0.0 });
-    };
+    }
+    let Estimate { value, error } = visible(a, b, occluders, tolerance, scratch)?;
+    // What differences show is often a hundredth of the tolerance, but so little is not to be relied on.
+    let error = error.max(0.25 * tolerance).min(unobstructed);
+    Ok(Estimate { value: clamp(value, 0.0, unobstructed), error })
+}
+
+/// [`visible_polygon_to_polygon`] as its differences tell.
+// apart: the stack of what nothing hides is not on top of its own
+#[inline(never)]
+fn visible(
+    a: &[Vec3],
+    b: &[Vec3],
+    occluders: &[[Vec3; 3]],
+    tolerance: f64,
+    scratch: &mut [Convex],
+) -> Result<Estimate, Error> {
+    let area = double_area(a);
+    let size = 0.5 * sqrt(area.dot(area));
     let (mut value, mut error) = (0.0, 0.0);
+    let Some(normal) = unit(area) else { return Ok(Estimate { value, error }) };
     for piece in pieces(a) {
         for target in pieces(b) {
             let Some((receiver, target)) = fronts(&piece, &target) else {
@@ -96,15 +115,13 @@ pub fn visible_polygon_to_polygon(
             let mut mean = Mean { normal, size, target, occluders, tolerance: 0.25 * tolerance, scratch };
             for patch in patches(receiver.corners()) {
                 let coarse = mean.over(&patch)?;
-                let part = mean.refined(&patch, coarse, f64::INFINITY, 0)?;
+                let part = mean.refined(&patch, coarse)?;
                 value += part.value;
                 error += part.error;
             }
         }
     }
-    // What differences show is often a hundredth of the tolerance, but so little is not to be relied on.
-    let error = error.max(0.25 * tolerance).min(unobstructed);
-    Ok(Estimate { value: clamp(value, 0.0, unobstructed), error })
+    Ok(Estimate { value, error })
 }
 
 /// The directions that a convex occluder hides: those on the positive side of all planes through the point.
@@ -227,22 +244,50 @@ impl Mean<'_> {
         Ok(sum / self.size)
     }
 
-    /// The same, halved until both resolutions agree; `parent`: how far they were apart before the last halving.
+    /// The same, halved until both resolutions agree.
     ///
     /// The patches that a shadow's outline bends lie along it, and are as many as it is longer than they are:
     /// each may differ by the tolerance times its own length's share. Along an outline the difference falls by
     /// 2.8 a halving and is shared by two: less than a quarter of the parent's is taken for chance.
-    fn refined(&mut self, patch: &Patch, coarse: f64, parent: f64, depth: u32) -> Result<Estimate, Error> {
-        let (lower, upper) = patch.halves();
-        let (low, high) = (self.over(&lower)?, self.over(&upper)?);
-        let difference = (low + high - coarse).abs();
-        let error = difference.max(0.25 * parent);
-        let within = error <= self.tolerance * patch.size() / sqrt(self.size);
-        if (within && depth >= SHALLOWEST) || depth >= DEEPEST {
-            return Ok(Estimate { value: low + high, error });
+    fn refined(&mut self, whole: &Patch, coarse: f64) -> Result<Estimate, Error> {
+        let mut halvings = [Halving::default(); DEEPEST as usize];
+        let (mut way, mut patch, mut coarse, mut parent) = (Way::default(), *whole, coarse, f64::INFINITY);
+        loop {
+            let (low, high) = (self.over(&patch.half(false))?, self.over(&patch.half(true))?);
+            let difference = (low + high - coarse).abs();
+            let error = difference.max(0.25 * parent);
+            let within = error <= self.tolerance * patch.size() / sqrt(self.size);
+            let depth = way.depth();
+            if !(within && depth >= SHALLOWEST) && way.down(DEEPEST) {
+                halvings.set(depth as usize, Halving { difference, high, ..Halving::default() });
+                (patch, coarse, parent) = (patch.half(false), low, difference);
+                continue;
+            }
+            let mut done = Estimate { value: low + high, error };
+            while way.up() {
+                let Halving { low_value, low_error, .. } = halvings.at(way.depth() as usize);
+                done = Estimate { value: low_value + done.value, error: low_error + done.error };
+            }
+            if !way.across() {
+                return Ok(done);
+            }
+            if let Some(halving) = halvings.get_mut(way.depth() as usize - 1) {
+                (halving.low_value, halving.low_error) = (done.value, done.error);
+                (coarse, parent) = (halving.high, halving.difference);
+            }
+            patch = way.steps().fold(*whole, |patch, upper| patch.half(upper));
         }
-        let low = self.refined(&lower, low, difference, depth + 1)?;
-        let high = self.refined(&upper, high, difference, depth + 1)?;
-        Ok(Estimate { value: low.value + high.value, error: low.error + high.error })
     }
+}
+
+/// A patch that was halved, on the way to its halves' parts.
+#[derive(Clone, Copy, Default)]
+struct Halving {
+    /// How far both resolutions were apart.
+    difference: f64,
+    /// The upper half by one rule.
+    high: f64,
+    /// What the lower half came to, once it has.
+    low_value: f64,
+    low_error: f64,
 }

@@ -68,6 +68,7 @@ impl<'m> Lines<'m> {
     ///
     /// Error of a span's ends: some rounding of a coordinate over the sine of the angle at which line and edge, or two
     /// facets, cross. Facets seen edge-on are left out.
+    #[inline(never)]
     pub fn find(&mut self, bvh: &Bvh<'_>, samples: &Samples, columns: usize, rows: Range<isize>) {
         self.first = rows.start;
         self.counts.fill([0; 2]);
