@@ -22,6 +22,7 @@ use blik_kernel::sun::{Sun, SunInput};
 use blik_kernel::sun_image::{self, Noting, SunImages};
 use core::ffi::c_void;
 use core::ops::Range;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 /// A solved scene in memory. Read-only once made: any number of threads may use it at once.
 pub struct blik_solution {
@@ -502,28 +503,31 @@ impl Shine<'_> {
             let part = (size / lanes.max(1)) & !(ALIGNMENT - 1);
             let part = if lanes > 1 { part.min(usual.next_multiple_of(ALIGNMENT)) } else { part };
             let range = |lane: usize| (next + lane * piece).min(rows)..(next + (lane + 1) * piece).min(rows);
-            let mut done = [0u16; MOST_LANES];
-            let noted = Start(done.as_mut_ptr());
+            // a bit each: which lanes' blocks hold rows
+            let done = [const { AtomicU32::new(0) }; MOST_LANES.div_ceil(32)];
             let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (rows + lanes * piece) as f64;
             runner.each(lanes, lanes, share, &|_, lane| {
                 if range(lane).is_empty() {
                     return Ok(());
                 }
-                // SAFETY: every lane is one item: its part of the scratch memory and its number are its own.
-                let (memory, noted) = unsafe {
-                    let memory = core::slice::from_raw_parts_mut(start.at(lane * part), part);
-                    (memory, &mut *noted.at(lane))
-                };
+                // SAFETY: every lane is one item: its part of the scratch memory is its own.
+                let memory = unsafe { core::slice::from_raw_parts_mut(start.at(lane * part), part) };
                 match beam::fill(scene, &base.bvh, elements, sun, settings, range(lane), memory) {
-                    Ok(rows) => *noted = rows as u16, // a piece has at most 1024
+                    Ok(_) => {
+                        if let Some(word) = done.get(lane / 32) {
+                            word.fetch_or(1 << (lane % 32), Ordering::Release);
+                        }
+                    }
                     Err(Error::BufferTooSmall { .. }) => {}
                     Err(error) => return Err(error.into()),
                 }
                 Ok(())
             })?;
             let before = next;
-            for (lane, done) in done.into_iter().enumerate().take(lanes).filter(|(_, done)| *done > 0) {
-                let done = usize::from(done);
+            let is_done = |lane: &usize| {
+                done.get(lane / 32).is_some_and(|word| word.load(Ordering::Acquire) >> (lane % 32) & 1 == 1)
+            };
+            for lane in (0..lanes).filter(is_done) {
                 let wanted: Range<usize> =
                     (before + lane * piece).min(rows)..(before + (lane + 1) * piece).min(rows);
                 if wanted.start != next {
@@ -532,6 +536,7 @@ impl Shine<'_> {
                 // SAFETY: all lanes have ended: the memory is this thread's alone.
                 let memory = unsafe { core::slice::from_raw_parts(start.at(lane * part), part) };
                 let block = [Block::open(memory)?];
+                let done = block[0].range().len();
                 let thrown = Coupling::part(&block);
                 beam::add(&thrown, (self.matrix, elements), sun, self.shape, direct, images);
                 let rays = |r: &blik_kernel::coupling::Row| u64::from(r.rays) + u64::from(r.chain_rays);

@@ -235,7 +235,7 @@ impl Tracer<'_, '_> {
 const BATCH: usize = 32;
 
 /// Rays that are traced together: they wait on the stack, which is small where there is no standard library.
-const GROUP: usize = if cfg!(feature = "std") { BATCH } else { 4 };
+const GROUP: usize = if cfg!(feature = "std") { BATCH } else { 1 };
 
 /// Sunlight on its way from mirror to mirror.
 #[derive(Clone, Copy)]
