@@ -384,11 +384,11 @@ impl Tracer<'_, '_> {
             departures: departures(all),
         };
         entries.add(&receiver, self.facing, &clear, &mut tally.known)?;
-        if tally.known.share() > 1.0 + OVERFULL {
+        let sound = tally.known.share() > 0.0 && tally.known.share() <= 1.0 + OVERFULL;
+        if !sound {
             self.sink.drop_row();
-            return Some(false);
         }
-        Some(true)
+        Some(sound)
     }
 
     /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
