@@ -1858,8 +1858,9 @@ void blik_intersector_init(struct blik_intersector *intersector);
  *
  * Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
  * facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
- * Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of form factors, of elements and of
- * pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
+ * Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of
+ * form factors, of elements and of pixels, and those from elements toward the sun), else one by one (chains by way of
+ * mirrors).
  */
 int32_t blik_scene_set_intersector(const struct blik_scene *scene,
                                    const struct blik_intersector *intersector,
@@ -2139,8 +2140,8 @@ int32_t blik_get_report(const struct blik_solution *solution,
  * Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
  * number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
  * of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
- * better, or has had three rounds. This is what the program `render` and the Rust interface go by; an estimate of up to
- * one and a half times the error asked for passes.
+ * better, would take too much, or has had three rounds. This is what the program `render` and the Rust interface go by;
+ * an estimate of up to one and a half times the error asked for passes.
  */
 int32_t blik_next_tolerance(const struct blik_report *report,
                             const struct blik_report *before,

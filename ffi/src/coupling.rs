@@ -78,6 +78,10 @@ impl Settings {
         RowSettings::new(&base.scene, self.tolerance, self.max_bounces, self.directional, self.all)
     }
 
+    fn planes(&self, base: &blik_scene) -> bool {
+        policy::planes(&base.scene, &self.rows(base))
+    }
+
     /// Those of a baked coupling.
     pub(crate) fn baked(tolerance: f64, max_bounces: Option<u32>, all: bool, directional: bool) -> Settings {
         Settings { tolerance, max_bounces, all, directional, fit: false, budget: None }
@@ -420,7 +424,7 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     let unknowns = subdivide::most_elements(base.scene.facets(), settings.tolerance) * base.scene.sides();
     let row = sink::bytes(piece(unknowns), 64, policy::unmerged(&rows), base.scene.bands())?;
     let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
-    let planes = Facing::bytes(&base.scene, !settings.directional)? + ALIGNMENT;
+    let planes = Facing::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
     let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
@@ -452,8 +456,8 @@ fn build(
     }
     let (place, rest) = place::<blik_coupling>(memory)?;
     let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) };
-    let planes = cutter.take_back(Facing::bytes(&base.scene, !settings.directional)?)?;
-    let facing = Facing::new(&base.scene, &base.bvh, !settings.directional, planes)?;
+    let planes = cutter.take_back(Facing::bytes(&base.scene, settings.planes(base))?)?;
+    let facing = Facing::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
     let elements = elements(base, &facing, settings, runner, &mut cutter)?;
     let mut rows = settings.rows_within(base, elements.unknowns());
     let most = most_blocks(elements.unknowns());
@@ -640,10 +644,10 @@ mod owned {
         settings: &Settings,
         runner: &mut Runner,
     ) -> Result<*mut blik_coupling, blik_error> {
-        let mut planes = Slab::new(Facing::bytes(&base.scene, !settings.directional)?)?;
+        let mut planes = Slab::new(Facing::bytes(&base.scene, settings.planes(base))?)?;
         // SAFETY: dropped at the end of this function, after the last use.
         let facing =
-            Facing::new(&base.scene, &base.bvh, !settings.directional, unsafe { planes.bytes_mut() })?;
+            Facing::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
         let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.tolerance)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
         let cut = cut(base, &facing, settings, runner, unsafe { scratch.bytes_mut() })?;

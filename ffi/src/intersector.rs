@@ -58,8 +58,9 @@ pub unsafe extern "C" fn blik_intersector_init(intersector: *mut blik_intersecto
 ///
 /// Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
 /// facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
-/// Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of form factors, of elements and of
-/// pixels, and those from elements toward the sun), else one by one (chains by way of mirrors).
+/// Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of
+/// form factors, of elements and of pixels, and those from elements toward the sun), else one by one (chains by way of
+/// mirrors).
 ///
 /// # Safety
 /// Pointers are null or valid.

@@ -188,24 +188,13 @@ impl<'m> Elements<'m> {
 
     /// Corners of an element in scene coordinates, wound as its facet.
     pub fn corners(&self, scene: &Scene<'_>, element: usize) -> [Vec3; 3] {
-        let triangle = &scene.corners().at(self.facet.at(element) as usize);
-        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
-            let (u, v) = self.in_facet(element, a, b);
-            point(triangle, u, v)
-        })
+        Path(self.path.at(element)).corners(&scene.corners().at(self.facet.at(element) as usize))
     }
 
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         self.memory
     }
-}
-
-/// The point of barycentric weights `u`, `v` (corners 1 and 2) of a triangle.
-#[inline(always)]
-pub fn point(triangle: &[Vec3; 3], u: f64, v: f64) -> Vec3 {
-    let [a, b, c] = *triangle;
-    a + (b - a) * u + (c - a) * v
 }
 
 #[cfg(test)]

@@ -72,7 +72,7 @@ impl<'m> Facing<'m> {
         let (words, sides) = (Facing::words(scene, wanted), scene.sides());
         let mut arena = Arena::new(memory, Facing::bytes(scene, wanted)?)?;
         if words == 0 {
-            return Ok(Facing { before: &[], screens: &[], shared: &[], words, sides });
+            return Ok(Facing::NONE);
         }
         let before = arena.take::<u64>(scene.facets() * sides * words)?;
         let screens = arena.take::<u64>(words)?;
@@ -180,6 +180,16 @@ pub struct Receiver {
     pub corners: [Vec3; 3],
 }
 
+impl Receiver {
+    /// Whether a part of a facet's side lies wholly before the receiver's plane, and the receiver before its.
+    pub(crate) fn faces(&self, scene: &Scene<'_>, (facet, side): (usize, usize), part: &[Vec3; 3]) -> bool {
+        let base = self.corners[0].dot(self.normal);
+        let (low, high) = heights(scene, facet, &self.corners);
+        part.iter().all(|c| c.dot(self.normal) - base >= -FLAT)
+            && if side == 0 { low >= -FLAT } else { high <= FLAT }
+    }
+}
+
 /// Facets that planes leave in question which are tried against the shafts of one receiver: where there are more,
 /// little is found to be clear.
 const TRIES: u32 = 64;
@@ -278,10 +288,10 @@ impl<'m> Clear<'m> {
 }
 
 /// Heights (scene coordinates) below which a plane is seen edge-on.
-pub const FLAT: f64 = 1e-13;
+const FLAT: f64 = 1e-13;
 
 /// The least and the greatest height of points above a facet's front.
-pub fn heights(scene: &Scene<'_>, facet: usize, points: &[Vec3; 3]) -> (f64, f64) {
+fn heights(scene: &Scene<'_>, facet: usize, points: &[Vec3; 3]) -> (f64, f64) {
     let normal = scene.side_normal(facet, 0);
     let base = scene.corners().at(facet)[0];
     let of = |p: Vec3| (p - base).dot(normal);

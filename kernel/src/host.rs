@@ -194,8 +194,9 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        let mut planes = Memory::new(Facing::bytes(&scene, !settings.directional)?);
-        let facing = Facing::new(&scene, &bvh, !settings.directional, planes.bytes_mut())?;
+        let wanted = policy::planes(&scene, &rows);
+        let mut planes = Memory::new(Facing::bytes(&scene, wanted)?);
+        let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
         let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
         let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
         let probing = policy::probing(&rows);

@@ -1,10 +1,10 @@
 //! Where light goes on from a facet: the point, the side, and the mirror direction.
 
 use crate::bvh::Bvh;
-use crate::element::point;
 use crate::index::Index;
 use crate::lobe::Lobe;
 use crate::math::{Vec3, reflect, sqrt};
+use crate::quarter::point;
 use crate::ray::{Hit, Ray};
 use crate::scene::{NO_MIRROR, Scene};
 

@@ -33,6 +33,11 @@ pub fn unmerged(rows: &RowSettings) -> usize {
     4 * rows.most_rays() as usize
 }
 
+/// Whether planes are compared ([`crate::facing::Facing`]): closed forms are for rows that keep no directions of the sky.
+pub fn planes(scene: &Scene<'_>, rows: &RowSettings) -> bool {
+    !rows.directional && (rows.all || scene.largest_diffuse() > 0.0)
+}
+
 /// The most probing rays of a point: all points of a triangle together have as many as a row of the coupling.
 pub fn probing(rows: &RowSettings) -> u32 {
     (rows.rays / 16).clamp(16, crate::subdivide::MOST_RAYS)

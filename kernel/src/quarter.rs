@@ -1,5 +1,7 @@
 //! Triangles cut into four congruent ones, and those again: where a point lies, in weights of corners 1 and 2.
 
+use crate::math::Vec3;
+
 /// Quarters of a triangle: those at its corners 0, 1 and 2, and the middle one.
 pub const QUARTERS: usize = 4;
 
@@ -27,6 +29,13 @@ pub fn into(a: f64, b: f64) -> (usize, (f64, f64)) {
     } else {
         (3, (1.0 - 2.0 * a, 1.0 - 2.0 * b))
     }
+}
+
+/// The point of barycentric weights `u`, `v` (corners 1 and 2) of a triangle.
+#[inline(always)]
+pub fn point(triangle: &[Vec3; 3], u: f64, v: f64) -> Vec3 {
+    let [a, b, c] = *triangle;
+    a + (b - a) * u + (c - a) * v
 }
 
 /// Which quarter of which quarter of a triangle: up to [`Path::DEEPEST`] steps.
@@ -60,6 +69,14 @@ impl Path {
     pub fn share(self) -> f64 {
         // 4^-depth, exactly
         1.0 / (1u64 << (2 * self.depth().min(30))) as f64
+    }
+
+    /// Corners of the path's end, of a triangle with these.
+    pub fn corners(self, triangle: &[Vec3; 3]) -> [Vec3; 3] {
+        [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
+            let (u, v) = self.out_of(a, b);
+            point(triangle, u, v)
+        })
     }
 
     /// The point of weights (a, b) at the path's end, as weights of the whole triangle.

@@ -234,6 +234,12 @@ impl<'m> Scene<'m> {
         self.values(self.emission, material)
     }
 
+    /// True where a material sends out diffuse light.
+    #[inline]
+    pub fn glows(&self, material: usize) -> bool {
+        self.diffuse(material).iter().chain(self.emission(material)).any(|&x| x > 0.0)
+    }
+
     /// Mirror class of a material: the index of the first material with the same mirror, or [`NO_MIRROR`].
     #[inline(always)]
     pub fn mirror(&self, material: usize) -> u32 {

@@ -8,7 +8,7 @@
 use crate::arena::{Arena, Need, plain_struct};
 use crate::bvh::{Ahead, Bvh};
 use crate::error::Error;
-use crate::facing::{Clear, FLAT, Facing, Receiver, WORDS, heights};
+use crate::facing::{Clear, Facing, Receiver, WORDS};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::index::{Index, IndexMut, span};
 use crate::math::{Vec3, frame};
@@ -353,10 +353,7 @@ impl Probe<'_> {
     fn closed(&self, node: &Node, side: usize, points: &[Vec3; POINTS]) -> Option<f64> {
         let facet = node.facet as usize;
         let normal = self.scene.side_normal(facet, side);
-        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(a, b)| {
-            let (u, v) = Path(node.path).out_of(a, b);
-            Surface::new(self.scene, facet, side, u, v).point
-        });
+        let corners = Path(node.path).corners(&self.scene.corners().at(facet));
         let receiver = Receiver { facet, side, normal, corners };
         let mut proven = [0; WORDS];
         let mut clear = Clear::new(&mut proven);
@@ -365,15 +362,12 @@ impl Probe<'_> {
         }
         let mut sums = [1.0; POINTS];
         let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
-        let base = corners[0].dot(normal);
         for other in self.facing.before(facet, side) {
             let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
-            let above = triangle.iter().all(|c| c.dot(normal) - base >= -FLAT);
-            let (low, high) = heights(self.scene, other, &corners);
             for other_side in (0..sides).filter(|&s| clear.has(other, s, sides)) {
                 let surface = Surface::new(self.scene, other, other_side, 1.0 / 3.0, 1.0 / 3.0);
                 let brightness = self.brightness(&surface) - 1.0;
-                if above && (if other_side == 0 { low >= -FLAT } else { high <= FLAT }) {
+                if receiver.faces(self.scene, (other, other_side), &triangle) {
                     together.put(&triangle, brightness);
                     if together.count == LANES {
                         together.take(self.bvh.isa(), points, normal, &mut sums);

@@ -9,13 +9,7 @@
 #include <thread>
 #include <vector>
 
-#define REQUIRE(condition)                                                        \
-    do {                                                                          \
-        if (!(condition)) {                                                       \
-            std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);  \
-            return 1;                                                             \
-        }                                                                         \
-    } while (false)
+#include "require.hpp"
 
 static_assert(!std::is_copy_constructible_v<blik::scene> && std::is_nothrow_move_constructible_v<blik::scene>);
 static_assert(!std::is_copy_assignable_v<blik::solution> && std::is_nothrow_move_assignable_v<blik::solution>);

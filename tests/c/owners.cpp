@@ -8,13 +8,7 @@
 #include <string>
 #include <vector>
 
-#define REQUIRE(condition)                                                        \
-    do {                                                                          \
-        if (!(condition)) {                                                       \
-            std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);  \
-            return 1;                                                             \
-        }                                                                         \
-    } while (false)
+#include "require.hpp"
 
 namespace {
 

@@ -9,11 +9,11 @@ use super::sink::Sink;
 use super::word::EMPTY;
 use super::{BLOCKED, Record};
 use crate::element::Elements;
-use crate::facing::{Clear, FLAT, Facing, Receiver, heights};
+use crate::facing::{Clear, Facing, Receiver};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, clamp, fabs, pow, sqrt};
-use crate::quarter::{self, QUARTERS};
+use crate::quarter::{self, Path, QUARTERS, point};
 use crate::scene::{NO_MIRROR, Scene};
 use crate::simd::Isa;
 
@@ -90,7 +90,7 @@ impl Target {
     /// What all elements of a side of a facet have in common.
     fn side(scene: &Scene<'_>, facet: usize, side: usize) -> Target {
         let material = scene.material(facet);
-        let glows = scene.diffuse(material).iter().chain(scene.emission(material)).any(|&x| x > 0.0);
+        let glows = scene.glows(material);
         let mirror = mirror_kind(scene.mirror(material));
         Target { unknown: 0, corners: [Vec3::ZERO; 3], normal: scene.side_normal(facet, side), glows, mirror }
     }
@@ -193,7 +193,7 @@ impl Entries<'_, '_> {
         // a small part of the error of rays, 0.9 n^-2/3
         let error = 0.05 * pow(f64::from(self.rays), -2.0 / 3.0);
         let rules = Rules::new(error);
-        let quarters = [0, 1, 2, 3].map(|q| part_of(&receiver.corners, q));
+        let quarters = [0, 1, 2, 3].map(|q| Path::default().step(q).corners(&receiver.corners));
         let place = Place { receiver, quarters, rules, middle: middle(&receiver.corners) };
         let mut lanes = [Lanes { unknowns: [0; LANES], count: 0 }; 3];
         let mut blocked = Blocked::default();
@@ -279,9 +279,9 @@ impl Entries<'_, '_> {
         for (quarter, means) in place.quarters.iter().zip(&mut means) {
             for &(u, v, weight) in rule {
                 let mut factors = [[0.0; LANES]];
-                let point = crate::element::point(quarter, u, v);
+                let from = point(quarter, u, v);
                 let block = core::slice::from_ref(&block);
-                point_to_triangles(self.isa, point, place.receiver.normal, block, &mut factors);
+                point_to_triangles(self.isa, from, place.receiver.normal, block, &mut factors);
                 means.iter_mut().zip(factors[0]).for_each(|(mean, factor)| *mean += weight * factor);
             }
         }
@@ -373,13 +373,9 @@ impl Place<'_> {
     /// The rule, by its number, that serves all quarters for a target that is wholly above the receiver's horizon, and
     /// the receiver above its own; none for others.
     fn class(&self, scene: &Scene<'_>, facet: usize, side: usize, target: &Target) -> Option<usize> {
-        let base = self.receiver.corners[0].dot(self.receiver.normal);
-        let above = target.corners.iter().all(|c| c.dot(self.receiver.normal) - base >= -FLAT);
-        let (low, high) = heights(scene, facet, &self.receiver.corners);
-        let faced = if side == 0 { low >= -FLAT } else { high <= FLAT };
         let radius = radius(&self.receiver.corners, self.middle);
         let distance = distance(self.middle, &target.corners) - 0.5 * radius;
-        if !above || !faced || distance <= 0.0 {
+        if distance <= 0.0 || !self.receiver.faces(scene, (facet, side), &target.corners) {
             return None;
         }
         match self.rules.of(0.5 * radius / distance)?.len() {
@@ -401,10 +397,12 @@ impl Place<'_> {
         let ratio = radius(triangle, centre) / distance(centre, &target.corners).max(f64::MIN_POSITIVE);
         let rule = self.rules.of(ratio).unwrap_or(&SIX);
         if ratio > self.rules.six && depth < DEEPEST {
-            return (0..QUARTERS).map(|q| 0.25 * self.mean(&part_of(triangle, q), target, depth + 1)).sum();
+            return (0..QUARTERS)
+                .map(|q| 0.25 * self.mean(&Path::default().step(q).corners(triangle), target, depth + 1))
+                .sum();
         }
         let of = |&(u, v, weight): &(f64, f64, f64)| {
-            weight * self.point_factor(crate::element::point(triangle, u, v), &target.corners, target)
+            weight * self.point_factor(point(triangle, u, v), &target.corners, target)
         };
         rule.iter().map(of).sum()
     }
@@ -413,7 +411,7 @@ impl Place<'_> {
     fn near_moment(&self, target: &Target) -> [f64; 2] {
         let (mut sum, mut moment) = (0.0, [0.0; 2]);
         for number in 0..QUARTERS {
-            let part = part_of(&target.corners, number);
+            let part = Path::default().step(number).corners(&target.corners);
             let factor: f64 = self.quarters.iter().map(|q| self.point_factor(middle(q), &part, target)).sum();
             let (a, b) = quarter::out_of(number, (1.0 / 3.0, 1.0 / 3.0));
             sum += factor;
@@ -446,14 +444,6 @@ fn middle(triangle: &[Vec3; 3]) -> Vec3 {
 /// Distance of the farthest corner.
 fn radius(triangle: &[Vec3; 3], from: Vec3) -> f64 {
     sqrt(triangle.iter().map(|c| (*c - from).length_squared()).fold(0.0, f64::max))
-}
-
-/// A quarter of a triangle.
-fn part_of(triangle: &[Vec3; 3], quarter: usize) -> [Vec3; 3] {
-    [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|local| {
-        let (u, v) = quarter::out_of(quarter, local);
-        crate::element::point(triangle, u, v)
-    })
 }
 
 /// Distance of a point from a triangle.
@@ -490,7 +480,7 @@ mod tests {
         let (receiver, rules) = place(a, error);
         let normal = unit((b[1] - b[0]).cross(b[2] - b[0])).unwrap();
         let target = Target { unknown: 0, corners: b, normal, glows: true, mirror: None };
-        let quarters = [0, 1, 2, 3].map(|q| part_of(&a, q));
+        let quarters = [0, 1, 2, 3].map(|q| Path::default().step(q).corners(&a));
         let place = Place { receiver: &receiver, quarters, rules, middle: middle(&a) };
         let own = place.quarters.iter().map(|q| 0.25 * place.mean(q, &target, 0)).sum();
         (own, polygon_to_polygon(&a, &b))

@@ -594,7 +594,7 @@ impl Tracer<'_, '_> {
             }
             let Some(surface) = surface else { return Some(()) };
             let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            if self.glows(surface.material) && !known {
+            if self.scene.glows(surface.material) && !known {
                 self.sink.push(Record::target(target, word, weight, mark))?;
             }
             let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
@@ -633,12 +633,6 @@ impl Tracer<'_, '_> {
 
     fn kept(&self, direction: Vec3) -> Option<Vec3> {
         self.settings.directional.then_some(direction)
-    }
-
-    /// True where a material sends out diffuse light.
-    #[inline]
-    fn glows(&self, material: usize) -> bool {
-        self.scene.diffuse(material).iter().chain(self.scene.emission(material)).any(|&x| x > 0.0)
     }
 }
 
