@@ -131,6 +131,7 @@ impl Runner {
 
     /// Calls `work(lane, item)` for all `items`, those of one lane one after the other; `share` of the whole call's
     /// progress. The error of the lowest item that failed.
+    #[inline(never)]
     pub fn each(
         &mut self,
         items: usize,
@@ -228,6 +229,7 @@ impl<T> Start<T> {
 
 impl Job<'_> {
     /// Takes items until none is left.
+    #[inline(never)]
     fn lane(&self, index: usize) {
         while !self.stop.load(Ordering::Relaxed) {
             let item = self.next.fetch_add(1, Ordering::Relaxed);

@@ -101,6 +101,14 @@ impl Asked {
     }
 }
 
+/// The sky that asks the caller.
+fn asking(sky: &'static Asked) -> impl Fn(Vec2) -> f64 + Sync {
+    move |direction| sky.radiance(direction)
+}
+
+/// A sky that is not looked at.
+const DARK: RadianceOf<'static> = &|_| 0.0;
+
 /// The caller's light, its arrays still the caller's.
 struct Given<'a> {
     sky: Option<blik_plane_sky>,
@@ -137,7 +145,7 @@ impl Given<'_> {
             let capture = (half_angle != 0.0).then_some(Capture { half_angle, radiance });
             PlaneSun { direction: Vec2::from(sun.direction), irradiance: sun.irradiance, capture }
         });
-        given.kernel(&|_| 0.0, &mut [Vec2::ZERO; MAX_JUMPS])?;
+        given.kernel(DARK, &mut [Vec2::ZERO; MAX_JUMPS])?;
         Ok(given)
     }
 
@@ -155,7 +163,7 @@ impl Given<'_> {
     }
 
     fn cuts(&self) -> Result<usize, blik_error> {
-        Ok(self.kernel(&|_| 0.0, &mut [Vec2::ZERO; MAX_JUMPS])?.cuts().len())
+        Ok(self.kernel(DARK, &mut [Vec2::ZERO; MAX_JUMPS])?.cuts().len())
     }
 }
 
@@ -214,11 +222,11 @@ fn build(
     let jumps = unsafe { core::slice::from_raw_parts_mut(jumps, MAX_JUMPS) };
     let mut asked = None;
     let ask: RadianceOf<'static> = match given.sky.and_then(|s| Some((s.radiance_of?, s.user))) {
-        None => &|_| 0.0,
+        None => DARK,
         Some((ask, user)) => {
             let sky = stow(&mut arena, Asked { ask, user, wrong: AtomicBool::new(false) })?;
             asked = Some(sky);
-            stow(&mut arena, move |direction| sky.radiance(direction))?
+            stow(&mut arena, asking(sky))?
         }
     };
     let light = given.kernel(ask, jumps)?;

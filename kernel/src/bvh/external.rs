@@ -37,8 +37,10 @@ impl fmt::Debug for External<'_> {
     }
 }
 
+// None of these is compiled into its callers, which are many and as a rule have no such tracer.
 impl External<'_> {
     /// What the tracer says; `Err` for a facet that the ray does not meet in the kernel's arithmetic.
+    #[inline(never)]
     pub fn closest(&self, ray: &Ray) -> Result<Option<Hit>, ()> {
         let mut facet = [NO_FACET];
         self.tracer.first(core::slice::from_ref(ray), &mut facet);
@@ -46,6 +48,7 @@ impl External<'_> {
     }
 
     /// What the tracer says.
+    #[inline(never)]
     pub fn any(&self, ray: &Ray) -> bool {
         let mut hit = [0];
         self.tracer.any(core::slice::from_ref(ray), &mut hit);
@@ -53,6 +56,7 @@ impl External<'_> {
     }
 
     /// What the tracer says of many rays, or `tree` where an answer names a facet that the ray does not meet.
+    #[inline(never)]
     pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let mut facets = [NO_FACET; BATCH];
         for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
@@ -66,6 +70,7 @@ impl External<'_> {
     }
 
     /// What the tracer says of many rays.
+    #[inline(never)]
     pub fn any_many(&self, rays: &[Ray], occluded: &mut [bool]) {
         let mut answers = [0; BATCH];
         for (rays, places) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
@@ -76,6 +81,7 @@ impl External<'_> {
         }
     }
 
+    #[inline(never)]
     fn hit(&self, ray: &Ray, facet: u32) -> Result<Option<Hit>, ()> {
         if facet == NO_FACET {
             return Ok(None);
