@@ -31,7 +31,7 @@ RULES = [
     # a mesh and a tracer of the caller's
     (r"^blik_kernel::scene::", r"^<blik::mesh::Reader as blik_kernel::scene::input::Mesh>::"),
     (r"^blik_kernel::bvh::external::", r"^<blik::intersector::Caller as blik_kernel::bvh::external::Intersector>::"),
-    (r"^<blik::intersector::Caller as ", ""),
+    (r"^<?blik::intersector::Caller\b", ""),
     # rays of a series, and who traces them
     (
         r"^blik_kernel::bvh::external::Ahead::answer$",

@@ -13,6 +13,7 @@ mod external;
 mod obvhs;
 mod stream;
 mod traverse;
+mod way;
 mod within;
 
 use crate::arena::{Arena, Need};

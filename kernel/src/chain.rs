@@ -337,34 +337,37 @@ impl Solved<'_> {
         let mut path = Path::default();
         let Work { through: [through, next], sums, squares, before, images } = work;
         through.head_mut(self.shape.bands).fill(1.0);
-        let leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
-        let mut fan = Fan { terms: sums, path, squares, before, through: next, count: 0 };
-        self.follow(leg, hit, &mut How { sample, outlook }, terms, &mut path, Some(&mut fan));
+        let mut leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
+        let how = &mut How { sample, outlook };
+        if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path, true) {
+            let fan = Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
+            self.branch(&mut leg, &lobe, how, terms, &mut path, fan);
+        }
         path
     }
 
-    /// Follows a chain whose ray meets `hit` first to its end; the first lobe branches into `fan` where the ray stands for
-    /// itself, all others take one ray.
+    /// Follows a chain whose ray meets `hit` first to its end; or, where it may branch and the ray stands for itself, to
+    /// the first lobe. All other lobes take one ray.
     fn follow(
         &self,
-        mut leg: Leg<'_>,
+        leg: &mut Leg<'_>,
         mut hit: Option<Hit>,
         how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-        mut fan: Option<&mut Fan<'_>>,
-    ) {
+        branches: bool,
+    ) -> Option<Hit> {
         loop {
             let Some(met) = hit else {
-                self.escape(&leg, terms);
-                return;
+                self.escape(leg, terms);
+                return None;
             };
             path.object |= leg.mirrors == 0;
-            let Some(surface) = Surface::of_hit(self.scene, &met) else { return };
-            self.add_diffuse(&mut leg, &surface, how, terms, path);
-            let Some(mirror) = surface.mirror(self.scene) else { return };
+            let surface = Surface::of_hit(self.scene, &met)?;
+            self.add_diffuse(leg, &surface, how, terms, path);
+            let mirror = surface.mirror(self.scene)?;
             if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
-                return;
+                return None;
             }
             let specular = self.scene.specular(surface.material);
             let bands = self.shape.bands;
@@ -377,8 +380,8 @@ impl Solved<'_> {
                 || leg.mirrors as usize >= crate::coupling::word::LONGEST
             {
                 path.tail += largest * self.brightest;
-                self.close(&leg, terms);
-                return;
+                self.close(leg, terms);
+                return None;
             }
             leg.mirrors += 1;
             leg.lobe = mirror.lobe.is_some();
@@ -398,19 +401,15 @@ impl Solved<'_> {
                     }
                 }
                 Some(_) => {
-                    self.add_sun_gloss(&leg, &surface, &mirror, terms);
+                    self.add_sun_gloss(leg, &surface, &mirror, terms);
                     leg.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
-                    if leg.lobes == 1
-                        && (asked || matches!(how.sample, Sample::Alone(_)))
-                        && let Some(fan) = fan.take()
-                    {
-                        self.branch(&mut leg, (&surface, &mirror), how, terms, path, fan);
-                        return;
+                    if leg.lobes == 1 && branches && (asked || matches!(how.sample, Sample::Alone(_))) {
+                        return Some(met);
                     }
                     let (u, v) = how.sample.lobe_point(leg.lobes);
-                    self.turn(&mut leg, &surface, &mirror, u, v);
+                    self.turn(leg, &surface, &mirror, u, v);
                 }
             }
             path.rays += 1;
@@ -447,13 +446,14 @@ impl Solved<'_> {
     fn branch(
         &self,
         leg: &mut Leg<'_>,
-        (surface, mirror): (&Surface, &Mirror),
+        hit: &Hit,
         how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-        fan: &mut Fan<'_>,
+        mut fan: Fan<'_>,
     ) {
-        let Some(lobe) = &mirror.lobe else { return };
+        let Some(surface) = Surface::of_hit(self.scene, hit) else { return };
+        let Some(lobe) = surface.mirror(self.scene).and_then(|mirror| mirror.lobe) else { return };
         let bands = self.shape.bands;
         let mirrored = surface.mirrored(self.scene, leg.ray.direction);
         let albedo = lobe.albedo(mirrored.dot(surface.normal));
@@ -470,7 +470,7 @@ impl Solved<'_> {
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
                 let ray = surface.leave(direction);
-                self.add_ray(leg, &ray, how, fan);
+                self.add_ray(leg, &ray, how, &mut fan);
             }
             if asked.is_none() {
                 goal = self.all_rays(fan.spread(self.reference));
@@ -504,8 +504,8 @@ impl Solved<'_> {
         let mut how = How { sample, outlook: &mut *how.outlook };
         let hit = self.bvh.closest(ray);
         let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
-        let leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
-        self.follow(leg, hit, &mut how, terms, path, None);
+        let mut leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
+        self.follow(&mut leg, hit, &mut how, terms, path, false);
         for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
             let value = terms.sum(b) - before;
             *square += value * value;

@@ -89,9 +89,13 @@ pub fn run<T: Task>(isa: Isa, task: T) -> T::Out {
 #[allow(missing_docs)]
 pub trait Lanes: Copy {
     type F8: Copy;
+    /// One number for all lanes: in a register where registers are wide, else itself.
+    type Same: Copy;
     /// Eight yes or no, as all bits or none.
     type M8: Copy;
     fn splat8(self, x: f32) -> Self::F8;
+    fn same(self, x: f32) -> Self::Same;
+    fn lanes(self, x: Self::Same) -> Self::F8;
     fn load8(self, x: &[f32; 8]) -> Self::F8;
     fn store8(self, x: Self::F8) -> [f32; 8];
     fn sub8(self, a: Self::F8, b: Self::F8) -> Self::F8;
@@ -188,6 +192,7 @@ macro_rules! arrays {
 
 impl Lanes for Arrays {
     type F8 = [f32; 8];
+    type Same = f32;
     type M8 = [u32; 8];
     arrays! {
         sub8(a, b) = *a - b;
@@ -199,6 +204,14 @@ impl Lanes for Arrays {
     }
     #[inline(always)]
     fn splat8(self, x: f32) -> [f32; 8] {
+        [x; 8]
+    }
+    #[inline(always)]
+    fn same(self, x: f32) -> f32 {
+        x
+    }
+    #[inline(always)]
+    fn lanes(self, x: f32) -> [f32; 8] {
         [x; 8]
     }
     #[inline(always)]
@@ -290,6 +303,7 @@ mod avx2 {
 
     impl super::Lanes for Avx2 {
         type F8 = __m256;
+        type Same = __m256;
         type M8 = __m256;
         avx2!(sub8 = _mm256_sub_ps, mul8 = _mm256_mul_ps, min8 = _mm256_min_ps, max8 = _mm256_max_ps);
         avx2!(add8 = _mm256_add_ps, div8 = _mm256_div_ps);
@@ -297,6 +311,14 @@ mod avx2 {
         fn splat8(self, x: f32) -> __m256 {
             // SAFETY: `self` proves AVX2.
             unsafe { _mm256_set1_ps(x) }
+        }
+        #[inline(always)]
+        fn same(self, x: f32) -> __m256 {
+            self.splat8(x)
+        }
+        #[inline(always)]
+        fn lanes(self, x: __m256) -> __m256 {
+            x
         }
         #[inline(always)]
         fn load8(self, x: &[f32; 8]) -> __m256 {

@@ -6,28 +6,45 @@ use core::cmp::Ordering;
 /// Slices up to this are sorted by insertion.
 const FEW: usize = 20;
 
+/// Parts that wait while longer ones are sorted: each is at most half of the one before, so that a million values need no
+/// more. The last to fit is sorted as a heap.
+const WAITING: usize = 16;
+
 /// Sorts `slice`; equal values end in any order.
 pub(crate) fn sort<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T) -> Ordering) {
+    if slice.len() <= FEW {
+        return insertion(slice, compare);
+    }
     // as often as halving would need, and as much again: beyond, the values are made to defeat the pivots
     let depth = 2 * (usize::BITS - slice.len().leading_zeros());
     quick(slice, compare, depth);
 }
 
-fn quick<T: Copy + Default>(mut slice: &mut [T], compare: &impl Fn(&T, &T) -> Ordering, mut depth: u32) {
-    while slice.len() > FEW {
-        if depth == 0 {
-            return heap(slice, compare);
+fn quick<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T) -> Ordering, depth: u32) {
+    let (mut longer, mut waiting) = ([(0, 0, 0); WAITING], 0);
+    let (mut start, mut end, mut depth) = (0, slice.len(), depth);
+    loop {
+        let part = slice.part_mut(start..end);
+        if part.len() > FEW && depth > 0 && waiting < WAITING {
+            depth -= 1;
+            let cut = start + partition(part, compare);
+            let (low, high) = ((start, cut), (cut + 1, end));
+            // the shorter part goes on in this loop, so that few wait
+            let (short, long) = if cut - start < end - cut - 1 { (low, high) } else { (high, low) };
+            longer.set(waiting, (long.0, long.1, depth));
+            waiting += 1;
+            (start, end) = short;
+            continue;
         }
-        depth -= 1;
-        let cut = partition(slice, compare);
-        let (low, rest) = slice.split_at_mut(cut.min(slice.len()));
-        let high = rest.part_mut(1..rest.len());
-        // the longer part goes on in this loop, so that the stack stays short
-        let (short, long) = if low.len() < high.len() { (low, high) } else { (high, low) };
-        quick(short, compare, depth);
-        slice = long;
+        if part.len() > FEW {
+            heap(part, compare)
+        } else {
+            insertion(part, compare)
+        }
+        let Some(next) = waiting.checked_sub(1) else { return };
+        waiting = next;
+        (start, end, depth) = longer.at(waiting);
     }
-    insertion(slice, compare);
 }
 
 /// Puts the `count` least values first.

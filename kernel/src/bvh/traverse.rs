@@ -14,11 +14,16 @@
 //! the origin and are no farther from it than twice the facet's extent x; products and rounding then leave its
 //! edge functions off by less than e (8.5 x + 2.3 e). Nothing is turned down for less than e (16 x + 4 e).
 
-use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, STACK, Slack};
+#[cfg(not(target_pointer_width = "32"))]
+use super::STACK;
+#[cfg(target_pointer_width = "32")]
+use super::way::{self, Way};
+use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, Slack};
 use crate::index::{Index, IndexMut};
 use crate::math::Vec3;
 use crate::ray::{Hit, Line, NEXT, Ray};
 use crate::simd::{self, LaneTask, Lanes};
+use core::marker::PhantomData;
 
 /// Factor on the far side of slabs: 1 + 2^-20, above the (1 + 2^-24)^10 that near and far sides need together.
 const WIDEN: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
@@ -36,8 +41,8 @@ pub(super) const SLACK: f64 = 16.0;
 /// Entries of the short stack, enough for nine levels of nodes.
 pub(super) const SHORT: usize = 64;
 
-/// Whether a tree's walk has a stack of its own length: on 32 bits, where code is scarce and f64 is slow, all have the long
-/// one.
+/// Whether a tree's walk has a short stack: on 32 bits, where code and stack are scarce and f64 is slow, all trees have one
+/// kind.
 #[inline(always)]
 pub(super) fn is_short(bvh: &Bvh) -> bool {
     cfg!(target_pointer_width = "64") && bvh.levels * 7 < SHORT
@@ -61,28 +66,120 @@ fn search(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
 /// Apart, so that its stack is no burden to who has a deep tree.
 #[inline(never)]
 fn search_short(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<SHORT> { bvh, ray, any })
+    simd::run_lanes(bvh.isa, Search::<[u64; SHORT]> { bvh, ray, any, left: PhantomData })
 }
 
 /// Apart, so that only who has a deep tree pays for the long stack.
 #[inline(never)]
 pub(super) fn search_deep(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<STACK> { bvh, ray, any })
+    #[cfg(target_pointer_width = "32")]
+    return simd::run_lanes(bvh.isa, Search::<Way> { bvh, ray, any, left: PhantomData });
+    #[cfg(not(target_pointer_width = "32"))]
+    simd::run_lanes(bvh.isa, Search::<[u64; STACK]> { bvh, ray, any, left: PhantomData })
 }
 
 /// The search for the first hit, or for any: not two searches, which would be twice the code.
-struct Search<'a, const N: usize> {
+struct Search<'a, W: Left> {
     bvh: &'a Bvh<'a>,
     ray: &'a Ray,
     any: bool,
+    left: PhantomData<W>,
 }
 
-impl<const N: usize> LaneTask for Search<'_, N> {
+impl<W: Left> LaneTask for Search<'_, W> {
     type Out = Option<Hit>;
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        Walk::new(self.bvh, self.ray)?.search::<L, N>(lanes, self.bvh, self.ray, self.any)
+        Walk::new(self.bvh, self.ray)?.search::<L, W>(lanes, self.bvh, self.ray, self.any)
+    }
+}
+
+/// What is left to visit of a search; how much stands apart, so that compilers keep it in a register.
+trait Left {
+    /// Nothing.
+    const NONE: Self;
+    /// Adds the children of a node that the ray meets (`hits`, as bits; not 0) and enters at `near`, but for the nearest,
+    /// which it returns.
+    fn add(&mut self, top: &mut usize, node: u32, children: &[u32; 8], near: &[f32; 8], hits: u32) -> u32;
+    /// Takes the next child that the ray enters before its limit.
+    fn take(&mut self, top: &mut usize, walk: &Walk, bvh: &Bvh) -> Option<u32>;
+}
+
+/// Children with the distances at which the ray enters them.
+impl<const N: usize> Left for [u64; N] {
+    const NONE: Self = [0; N];
+
+    #[inline(always)]
+    fn add(&mut self, top: &mut usize, _: u32, children: &[u32; 8], near: &[f32; 8], mut hits: u32) -> u32 {
+        let entry = |hits: u32| {
+            let child = hits.trailing_zeros() as usize & 7;
+            u64::from(near[child].to_bits()) << 32 | u64::from(children[child])
+        };
+        let mut nearest = entry(hits);
+        let bottom = *top;
+        hits &= hits - 1;
+        while hits != 0 {
+            let other = entry(hits);
+            push(self, bottom, top, nearest.max(other));
+            nearest = nearest.min(other);
+            hits &= hits - 1;
+        }
+        nearest as u32
+    }
+
+    #[inline(always)]
+    fn take(&mut self, top: &mut usize, walk: &Walk, _: &Bvh) -> Option<u32> {
+        while *top > 0 {
+            *top -= 1;
+            let entry = self.get(*top).copied()?;
+            if f32::from_bits((entry >> 32) as u32) <= walk.limit {
+                return Some(entry as u32);
+            }
+        }
+        None
+    }
+}
+
+/// A seventh of that: nodes with the places of their children, four bits each, the nearest lowest, whose distances are
+/// computed again.
+#[cfg(target_pointer_width = "32")]
+impl Left for Way {
+    const NONE: Self = way::START;
+
+    #[inline(always)]
+    fn add(
+        &mut self,
+        top: &mut usize,
+        node: u32,
+        children: &[u32; 8],
+        near: &[f32; 8],
+        mut hits: u32,
+    ) -> u32 {
+        let (mut sorted, mut count) = ([0; 8], 0);
+        while hits != 0 {
+            let child = hits.trailing_zeros() & 7;
+            let entry = u64::from(near[child as usize].to_bits()) << 32 | u64::from(child);
+            push(&mut sorted, 0, &mut count, entry);
+            hits &= hits - 1;
+        }
+        let last = count.saturating_sub(1);
+        let others = sorted.head(last).iter().fold(0, |places, &entry| places << 4 | 8 | entry as u32);
+        way::enter(self, top, node, others);
+        children[sorted.at(last) as usize & 7]
+    }
+
+    #[inline(always)]
+    fn take(&mut self, top: &mut usize, walk: &Walk, bvh: &Bvh) -> Option<u32> {
+        loop {
+            let (node, places) = way::deepest(self, top)?;
+            let child = *places as usize & 7;
+            *places >>= 4;
+            let (boxes, children) = (bvh.boxes.get(*node as usize)?, bvh.children.get(*node as usize)?);
+            if walk.entry(boxes, child) <= walk.limit {
+                return Some(children[child]);
+            }
+        }
     }
 }
 
@@ -183,34 +280,19 @@ impl Walk {
 
     /// The walk itself: nearest child first, the rest on the stack with their distances.
     #[inline(always)]
-    fn search<L: Lanes, const N: usize>(mut self, lanes: L, bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
+    fn search<L: Lanes, W: Left>(mut self, lanes: L, bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
         let beam = Beam::new(lanes, &self);
+        let (mut left, mut top) = (W::NONE, 0);
         let mut best = None;
-        let mut stack = [0u64; N];
-        let mut top = 0;
         let mut next = if bvh.boxes.is_empty() { return None } else { 0 };
         loop {
             if next & LEAF == 0 {
                 let boxes = bvh.boxes.get(next as usize)?;
                 let children = bvh.children.get(next as usize)?;
                 let (near, far) = beam.slabs(boxes, self.limit);
-                let mut hits = lanes.le8(near, far);
-                let near = lanes.store8(near);
-                let entry = |hits: u32| {
-                    let child = hits.trailing_zeros() as usize & 7;
-                    u64::from(near[child].to_bits()) << 32 | u64::from(children[child])
-                };
+                let hits = lanes.le8(near, far);
                 if hits != 0 {
-                    let mut nearest = entry(hits);
-                    let bottom = top;
-                    hits &= hits - 1;
-                    while hits != 0 {
-                        let other = entry(hits);
-                        push(&mut stack, bottom, &mut top, nearest.max(other));
-                        nearest = nearest.min(other);
-                        hits &= hits - 1;
-                    }
-                    next = nearest as u32;
+                    next = left.add(&mut top, next, children, &lanes.store8(near), hits);
                     continue;
                 }
             } else {
@@ -219,17 +301,21 @@ impl Walk {
                     return best;
                 }
             }
-            next = loop {
-                if top == 0 {
-                    return best;
-                }
-                top -= 1;
-                let entry = stack.get(top).copied()?;
-                if f32::from_bits((entry >> 32) as u32) <= self.limit {
-                    break entry as u32;
-                }
-            };
+            let Some(child) = left.take(&mut top, &self, bvh) else { return best };
+            next = child;
         }
+    }
+
+    /// Where the ray enters one of a node's boxes that it meets: as [`Beam::slabs`] has it.
+    #[cfg(target_pointer_width = "32")]
+    #[inline(always)]
+    fn entry(&self, boxes: &Boxes, child: usize) -> f32 {
+        let mut entry = 0.0;
+        for (k, sides) in boxes.iter().enumerate() {
+            let near = (sides[usize::from(self.side[k] & 1)][child & 7] - self.near[k]) * self.inverse[k];
+            entry = if near > entry { near } else { entry };
+        }
+        entry
     }
 
     /// Tests the packets of a leaf.
@@ -275,17 +361,17 @@ impl Walk {
     }
 }
 
-/// What the lanes need of a ray, in every lane.
+/// What the lanes need of a ray.
 pub(super) struct Beam<L: Lanes> {
     lanes: L,
     side: [u8; 3],
-    near: [L::F8; 3],
-    far: [L::F8; 3],
-    inverse: [L::F8; 3],
+    near: [L::Same; 3],
+    far: [L::Same; 3],
+    inverse: [L::Same; 3],
     skip: u32,
     axes: [u8; 3],
-    origin: [L::F8; 3],
-    shear: [L::F8; 2],
+    origin: [L::Same; 3],
+    shear: [L::Same; 2],
     error: f32,
 }
 
@@ -296,13 +382,13 @@ impl<L: Lanes> Beam<L> {
         Beam {
             lanes,
             side: walk.side,
-            near: [lanes.splat8(n[0]), lanes.splat8(n[1]), lanes.splat8(n[2])],
-            far: [lanes.splat8(f[0]), lanes.splat8(f[1]), lanes.splat8(f[2])],
-            inverse: [lanes.splat8(i[0]), lanes.splat8(i[1]), lanes.splat8(i[2])],
+            near: [lanes.same(n[0]), lanes.same(n[1]), lanes.same(n[2])],
+            far: [lanes.same(f[0]), lanes.same(f[1]), lanes.same(f[2])],
+            inverse: [lanes.same(i[0]), lanes.same(i[1]), lanes.same(i[2])],
             skip: walk.skip,
             axes: walk.axes,
-            origin: [lanes.splat8(o[0]), lanes.splat8(o[1]), lanes.splat8(o[2])],
-            shear: [lanes.splat8(walk.shear[0]), lanes.splat8(walk.shear[1])],
+            origin: [lanes.same(o[0]), lanes.same(o[1]), lanes.same(o[2])],
+            shear: [lanes.same(walk.shear[0]), lanes.same(walk.shear[1])],
             error: walk.error,
         }
     }
@@ -317,8 +403,9 @@ impl<L: Lanes> Beam<L> {
         let rays = self.near.iter().zip(&self.far).zip(&self.inverse).zip(&self.side);
         for (sides, (((&start, &end), &inverse), &side)) in boxes.iter().zip(rays) {
             let (first, last) = (&sides[usize::from(side & 1)], &sides[usize::from(side & 1 ^ 1)]);
-            let entry = lanes.sub8(lanes.load8(first), start);
-            let exit = lanes.sub8(lanes.load8(last), end);
+            let inverse = lanes.lanes(inverse);
+            let entry = lanes.sub8(lanes.load8(first), lanes.lanes(start));
+            let exit = lanes.sub8(lanes.load8(last), lanes.lanes(end));
             near = lanes.max8(lanes.mul8(entry, inverse), near);
             far = lanes.min8(lanes.mul8(exit, inverse), far);
         }
@@ -348,15 +435,21 @@ impl<L: Lanes> Beam<L> {
         let [first, second, along] = self.axes;
         let depth = self.moved(corner, along, self.origin[2]);
         [
-            lanes.sub8(self.moved(corner, first, self.origin[0]), lanes.mul8(self.shear[0], depth)),
-            lanes.sub8(self.moved(corner, second, self.origin[1]), lanes.mul8(self.shear[1], depth)),
+            lanes.sub8(
+                self.moved(corner, first, self.origin[0]),
+                lanes.mul8(lanes.lanes(self.shear[0]), depth),
+            ),
+            lanes.sub8(
+                self.moved(corner, second, self.origin[1]),
+                lanes.mul8(lanes.lanes(self.shear[1]), depth),
+            ),
         ]
     }
 
     #[inline(always)]
-    fn moved(&self, corner: &[[f32; 8]; 3], axis: u8, origin: L::F8) -> L::F8 {
+    fn moved(&self, corner: &[[f32; 8]; 3], axis: u8, origin: L::Same) -> L::F8 {
         let row = &corner[usize::from(if axis < 3 { axis } else { 0 })];
-        self.lanes.sub8(self.lanes.load8(row), origin)
+        self.lanes.sub8(self.lanes.load8(row), self.lanes.lanes(origin))
     }
 
     #[inline(always)]

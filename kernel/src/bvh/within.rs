@@ -1,9 +1,8 @@
 //! Which facets reach into a convex region: those of a row of pixels, or those that may stand in the way of parallel
 //! rays that leave a facet.
 
-use super::traverse::SHORT;
-use super::{Boxes, Bvh, LANES, LEAF, PAIR, Packet, STACK};
-use crate::index::{Index, IndexMut};
+use super::way::{START, deepest, enter};
+use super::{Boxes, Bvh, LANES, LEAF, PAIR, Packet};
 use crate::math::{Vec3, fabs};
 use crate::ray::{Hit, Line, Ray};
 use crate::simd::{self, LaneTask, Lanes};
@@ -25,11 +24,7 @@ impl Bvh<'_> {
     /// returns false. A facet is left out where all its corners are outside of one half for certain: to 4 roundings of
     /// a coordinate and of the height.
     pub(crate) fn within<const N: usize>(&self, halves: &[Half; N], visit: impl FnMut(u32) -> bool) {
-        if self.levels * 7 < SHORT {
-            simd::run_lanes(self.isa, Within::<_, N, SHORT> { bvh: self, halves, visit });
-        } else {
-            simd::run_lanes(self.isa, Within::<_, N, STACK> { bvh: self, halves, visit });
-        }
+        simd::run_lanes(self.isa, Within { bvh: self, halves, visit });
     }
 
     /// Corners and normal (of any length) of a facet.
@@ -65,13 +60,13 @@ impl Bvh<'_> {
     }
 }
 
-struct Within<'a, F, const N: usize, const DEPTH: usize> {
+struct Within<'a, F, const N: usize> {
     bvh: &'a Bvh<'a>,
     halves: &'a [Half; N],
     visit: F,
 }
 
-impl<F: FnMut(u32) -> bool, const N: usize, const DEPTH: usize> LaneTask for Within<'_, F, N, DEPTH> {
+impl<F: FnMut(u32) -> bool, const N: usize> LaneTask for Within<'_, F, N> {
     type Out = ();
 
     #[inline(always)]
@@ -81,38 +76,30 @@ impl<F: FnMut(u32) -> bool, const N: usize, const DEPTH: usize> LaneTask for Wit
         for (plane, half) in planes.iter_mut().zip(self.halves) {
             *plane = Plane::new(lanes, half, bvh.scale);
         }
-        let mut stack = [0u32; DEPTH];
-        let mut top = usize::from(!bvh.boxes.is_empty());
-        while top > 0 {
-            top -= 1;
-            let child = stack.at(top);
-            if child & LEAF != 0 {
-                if !self.leaf(&planes, child) {
-                    return;
+        let (mut way, mut depth) = (START, 0);
+        let mut next = 0;
+        loop {
+            if next & LEAF == 0 {
+                let Some(boxes) = bvh.boxes.get(next as usize) else { return };
+                // loops rather than closures, which are not inlined into code compiled for another instruction set
+                let mut reached = 0xff;
+                for plane in &planes {
+                    reached &= plane.reached_by_boxes(boxes);
                 }
-                continue;
+                enter(&mut way, &mut depth, next, reached);
+            } else if !self.leaf(&planes, next) {
+                return;
             }
-            let (Some(boxes), Some(children)) =
-                (bvh.boxes.get(child as usize), bvh.children.get(child as usize))
-            else {
-                continue;
-            };
-            // loops rather than closures, which are not inlined into code compiled for another instruction set
-            let mut left = 0xff;
-            for plane in &planes {
-                left &= plane.reached_by_boxes(boxes);
-            }
-            while left != 0 {
-                let place = left.trailing_zeros() as usize & 7;
-                left &= left - 1;
-                stack.set(top, children[place]);
-                top = (top + 1).min(DEPTH - 1);
-            }
+            let Some((node, left)) = deepest(&mut way, &mut depth) else { return };
+            let child = left.ilog2() as usize & 7;
+            *left &= !(1 << child);
+            let Some(children) = bvh.children.get(*node as usize) else { return };
+            next = children[child];
         }
     }
 }
 
-impl<F: FnMut(u32) -> bool, const N: usize, const DEPTH: usize> Within<'_, F, N, DEPTH> {
+impl<F: FnMut(u32) -> bool, const N: usize> Within<'_, F, N> {
     /// False where that was enough.
     #[inline(always)]
     fn leaf<L: Lanes>(&mut self, planes: &[Plane<L>; N], leaf: u32) -> bool {
@@ -156,10 +143,10 @@ const SLACK32: f64 = 1.0 / (1u64 << 20) as f64;
 struct Plane<L: Lanes> {
     lanes: L,
     /// The first component, and those of the others with the sign changed: lanes subtract and do not add.
-    normal: [L::F8; 3],
+    normal: [L::Same; 3],
     /// Which side of a box is farthest along the normal.
     side: [usize; 3],
-    height: L::F8,
+    height: L::Same,
 }
 
 impl<L: Lanes> Plane<L> {
@@ -169,9 +156,9 @@ impl<L: Lanes> Plane<L> {
         let height = half.height - SLACK32 * (scale + fabs(half.height));
         Plane {
             lanes,
-            normal: [lanes.splat8(x as f32), lanes.splat8(-y as f32), lanes.splat8(-z as f32)],
+            normal: [lanes.same(x as f32), lanes.same(-y as f32), lanes.same(-z as f32)],
             side: [usize::from(x > 0.0), usize::from(y > 0.0), usize::from(z > 0.0)],
-            height: lanes.splat8(height as f32),
+            height: lanes.same(height as f32),
         }
     }
 
@@ -180,7 +167,7 @@ impl<L: Lanes> Plane<L> {
     fn reached_by_boxes(&self, boxes: &Boxes) -> u32 {
         let [x, y, z] = self.side;
         let corner = [&boxes[0][x & 1], &boxes[1][y & 1], &boxes[2][z & 1]];
-        self.lanes.le8(self.height, self.dot(corner))
+        self.lanes.le8(self.lanes.lanes(self.height), self.dot(corner))
     }
 
     #[inline(always)]
@@ -188,14 +175,14 @@ impl<L: Lanes> Plane<L> {
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = packet;
         let (a, b, c) = (self.dot([ax, ay, az]), self.dot([bx, by, bz]), self.dot([cx, cy, cz]));
         let lanes = self.lanes;
-        lanes.le8(self.height, lanes.max8(lanes.max8(a, b), c))
+        lanes.le8(lanes.lanes(self.height), lanes.max8(lanes.max8(a, b), c))
     }
 
     #[inline(always)]
     fn dot(&self, [x, y, z]: [&[f32; 8]; 3]) -> L::F8 {
         let lanes = self.lanes;
-        let sum = lanes.mul8(lanes.load8(x), self.normal[0]);
-        let sum = lanes.sub8(sum, lanes.mul8(lanes.load8(y), self.normal[1]));
-        lanes.sub8(sum, lanes.mul8(lanes.load8(z), self.normal[2]))
+        let sum = lanes.mul8(lanes.load8(x), lanes.lanes(self.normal[0]));
+        let sum = lanes.sub8(sum, lanes.mul8(lanes.load8(y), lanes.lanes(self.normal[1])));
+        lanes.sub8(sum, lanes.mul8(lanes.load8(z), lanes.lanes(self.normal[2])))
     }
 }

@@ -35,7 +35,7 @@ const SIX: [(f64, f64, f64); 6] = {
 };
 
 /// Times that a quarter is cut again beside what it touches.
-const DEEPEST: u32 = 4;
+const DEEPEST: usize = 4;
 
 /// Which rule serves a triangle of so large a radius over the distance.
 #[derive(Clone, Copy, PartialEq)]
@@ -232,7 +232,7 @@ impl Entries<'_, '_> {
         target: &Target,
         (known, blocked): (&mut Known, &mut Blocked),
     ) -> Option<()> {
-        let factors = place.quarters.each_ref().map(|q| place.mean(q, target, 0));
+        let factors = place.quarters.each_ref().map(|q| place.mean(q, target));
         known.add(target, &factors);
         self.entry(place, target, factors, true, blocked)
     }
@@ -391,20 +391,39 @@ impl Place<'_> {
         if before { point_to_triangle(point, self.receiver.normal, part) } else { 0.0 }
     }
 
-    /// The mean over a triangle of the receiver of the factor to a target.
-    fn mean(&self, triangle: &[Vec3; 3], target: &Target, depth: u32) -> f64 {
-        let centre = middle(triangle);
-        let ratio = radius(triangle, centre) / distance(centre, &target.corners).max(f64::MIN_POSITIVE);
-        let rule = self.rules.of(ratio).unwrap_or(&SIX);
-        if ratio > self.rules.six && depth < DEEPEST {
-            return (0..QUARTERS)
-                .map(|q| 0.25 * self.mean(&Path::default().step(q).corners(triangle), target, depth + 1))
-                .sum();
+    /// The mean over a triangle of the receiver of the factor to a target: of its quarters, and theirs, as far as these
+    /// are too large for a rule.
+    fn mean(&self, triangle: &[Vec3; 3], target: &Target) -> f64 {
+        const NONE: ([Vec3; 3], usize, f64) = ([Vec3::ZERO; 3], 0, 0.0);
+        // triangles in quarters, the next quarter, and the sum over those before
+        let (mut whole, mut depth) = ([NONE; DEEPEST], 0);
+        let mut part = *triangle;
+        loop {
+            let centre = middle(&part);
+            let ratio = radius(&part, centre) / distance(centre, &target.corners).max(f64::MIN_POSITIVE);
+            if ratio > self.rules.six && depth < DEEPEST {
+                whole.set(depth, (part, 1, 0.0));
+                depth += 1;
+                part = Path::default().step(0).corners(&part);
+                continue;
+            }
+            let of = |&(u, v, weight): &(f64, f64, f64)| {
+                weight * self.point_factor(point(&part, u, v), &target.corners, target)
+            };
+            let mut mean: f64 = self.rules.of(ratio).unwrap_or(&SIX).iter().map(of).sum();
+            part = loop {
+                let Some((triangle, next, sum)) = depth.checked_sub(1).and_then(|d| whole.get_mut(d)) else {
+                    return mean;
+                };
+                *sum += 0.25 * mean;
+                if *next < QUARTERS {
+                    *next += 1;
+                    break Path::default().step(*next - 1).corners(triangle);
+                }
+                mean = *sum;
+                depth -= 1;
+            };
         }
-        let of = |&(u, v, weight): &(f64, f64, f64)| {
-            weight * self.point_factor(point(triangle, u, v), &target.corners, target)
-        };
-        rule.iter().map(of).sum()
     }
 
     /// Where on a near target its light comes from on average, in its local coordinates: by its quarters.
@@ -482,7 +501,7 @@ mod tests {
         let target = Target { unknown: 0, corners: b, normal, glows: true, mirror: None };
         let quarters = [0, 1, 2, 3].map(|q| Path::default().step(q).corners(&a));
         let place = Place { receiver: &receiver, quarters, rules, middle: middle(&a) };
-        let own = place.quarters.iter().map(|q| 0.25 * place.mean(q, &target, 0)).sum();
+        let own = place.quarters.iter().map(|q| 0.25 * place.mean(q, &target)).sum();
         (own, polygon_to_polygon(&a, &b))
     }
 

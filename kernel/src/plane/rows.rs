@@ -3,7 +3,7 @@
 
 use crate::arena::plain_struct;
 use crate::error::{Error, Field};
-use crate::index::{pieces, span};
+use crate::index::{IndexMut, pieces, span};
 use crate::math::{clamp, floor, sqrt};
 use crate::plane::light::Light;
 use crate::plane::scene::{PlaneScene, Primitive};
@@ -320,29 +320,37 @@ impl Station<'_> {
                 let s = span.from + (span.to - span.from) * x * x * (3.0 - 2.0 * x);
                 Probe { s, signature: self.signature(s) }
             };
-            let bisections = if points <= 6 { 11 } else { 16 };
+            let bisections = if points <= 6 { 11 } else { BISECTIONS };
             let mut before = probe(0);
             for i in 1..PROBES {
                 let next = probe(i);
-                self.changes(before, next, bisections, &mut |s| part(s, sink, scratch));
+                self.changes(before, next, bisections, |s| part(s, sink, scratch));
                 before = next;
             }
         }
         part(span.to, sink, scratch);
     }
 
-    /// Calls `change` with the sines between two probes at which the chain changes, in order.
-    fn changes(&self, a: Probe, b: Probe, depth: u32, change: &mut impl FnMut(f64)) {
-        if a.signature == b.signature {
-            return;
+    /// Calls `change` with the sines between two probes at which the chain changes, in order, found by so many bisections.
+    fn changes(&self, mut a: Probe, mut b: Probe, bisections: usize, mut change: impl FnMut(f64)) {
+        // ends of the intervals to the right, and the bisections that are left for them
+        let (mut ends, mut waiting, mut depth) = ([(b, 0); BISECTIONS], 0, bisections);
+        loop {
+            let s = 0.5 * (a.s + b.s);
+            if a.signature != b.signature && depth > 0 && waiting < BISECTIONS {
+                depth -= 1;
+                ends.set(waiting, (b, depth));
+                waiting += 1;
+                b = Probe { s, signature: self.signature(s) };
+                continue;
+            }
+            if a.signature != b.signature {
+                change(s);
+            }
+            let Some(&(end, left)) = waiting.checked_sub(1).and_then(|w| ends.get(w)) else { return };
+            waiting -= 1;
+            (a, b, depth) = (b, end, left);
         }
-        let s = 0.5 * (a.s + b.s);
-        if depth == 0 {
-            return change(s);
-        }
-        let middle = Probe { s, signature: self.signature(s) };
-        self.changes(a, middle, depth - 1, change);
-        self.changes(middle, b, depth - 1, change);
     }
 
     /// A number that tells apart which mirrors the chain along sine `s` meets, whether the sun shines on them,
@@ -387,6 +395,8 @@ const LONGEST_TOLD_APART: u32 = 256;
 
 /// First guesses a span at where chains change.
 const PROBES: usize = 12;
+/// Halvings of the interval between two in which the chain changes, at most.
+const BISECTIONS: usize = 16;
 
 /// The chain along one direction.
 #[derive(Clone, Copy)]
