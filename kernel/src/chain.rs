@@ -215,6 +215,8 @@ impl Sample {
 struct How<'w, 'm> {
     sample: Sample,
     outlook: &'w mut Outlook<'m>,
+    /// Whether the first lobe ends it where the ray stands for itself.
+    branches: bool,
 }
 
 /// A chain on its way.
@@ -285,6 +287,7 @@ impl Fan<'_> {
     }
 
     /// Expected error of the mean over the reference radiance; `through` is what a radiance of 1 brings.
+    #[inline(never)]
     fn error(&self, reference: &[f64], through: f64) -> f64 {
         let n = f64::from(self.count.max(1));
         let (seen, between) =
@@ -293,6 +296,7 @@ impl Fan<'_> {
     }
 
     /// Adds the mean of all rays.
+    #[inline(never)]
     fn mean_into(&self, terms: &mut Terms, path: &mut Path, bands: usize) {
         let share = 1.0 / f64::from(self.count.max(1));
         for band in 0..bands.min(MAX_BANDS) {
@@ -338,8 +342,8 @@ impl Solved<'_> {
         let Work { through: [through, next], sums, squares, before, images } = work;
         through.head_mut(self.shape.bands).fill(1.0);
         let mut leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
-        let how = &mut How { sample, outlook };
-        if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path, true) {
+        let how = &mut How { sample, outlook, branches: true };
+        if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
             let fan = Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
             self.branch(&mut leg, &lobe, how, terms, &mut path, fan);
         }
@@ -355,7 +359,6 @@ impl Solved<'_> {
         how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-        branches: bool,
     ) -> Option<Hit> {
         loop {
             let Some(met) = hit else {
@@ -405,7 +408,7 @@ impl Solved<'_> {
                     leg.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
-                    if leg.lobes == 1 && branches && (asked || matches!(how.sample, Sample::Alone(_))) {
+                    if leg.lobes == 1 && how.branches && (asked || matches!(how.sample, Sample::Alone(_))) {
                         return Some(met);
                     }
                     let (u, v) = how.sample.lobe_point(leg.lobes);
@@ -434,6 +437,7 @@ impl Solved<'_> {
     }
 
     /// One ray of a lobe, weighed with the lobe's albedo.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn turn(&self, leg: &mut Leg<'_>, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
         let (direction, share) = surface.go_on(self.scene, mirror, leg.ray.direction, u, v);
         leg.through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
@@ -501,11 +505,11 @@ impl Solved<'_> {
         copy(through.head_mut(bands), leg.through.head(bands));
         path.rays += 1;
         let sample = Sample::OneOf { seed: how.sample.seed(), index: *count };
-        let mut how = How { sample, outlook: &mut *how.outlook };
+        let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
         let hit = self.bvh.closest(ray);
         let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
         let mut leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
-        self.follow(&mut leg, hit, &mut how, terms, path, false);
+        self.follow(&mut leg, hit, &mut how, terms, path);
         for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
             let value = terms.sum(b) - before;
             *square += value * value;

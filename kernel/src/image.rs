@@ -180,22 +180,31 @@ pub fn rows(
     let ways = arena.take::<Way>(Outlook::ROOM)?;
     let items = Items::new(&mut arena, width, DRAWN)?;
     let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
-    let last = range.end as isize + isize::from(area);
-    let line = if camera.is_parallel() { Line::new(&camera.ray(0.0, 0.0)) } else { None };
-    let primary = Primary { samples: camera.samples(), items, draws, drawn: 0..0, last, line };
-    let outlook = if solved.bvh.is_own() {
-        Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS)
-    } else {
-        Outlook::none()
+    let mut painter = Painter {
+        solved,
+        camera,
+        lines,
+        work,
+        width,
+        stride,
+        board,
+        beside: false,
+        primary: Primary {
+            samples: camera.samples(),
+            items,
+            draws,
+            drawn: 0..0,
+            last: range.end as isize + isize::from(area),
+            line: None,
+        },
+        outlook: Outlook::none(),
+        tally: Tally::default(),
     };
-    let tally = Tally::default();
-    let mut painter =
-        Painter { solved, camera, lines, work, width, stride, board, beside: false, primary, outlook, tally };
+    if solved.bvh.is_own() {
+        painter.outlook = Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
+    }
     if camera.is_parallel() {
-        let Board { terms, work, background, .. } = &mut *painter.board;
-        let seen = (&camera.ray(0.0, 0.0), None);
-        solved.radiance_with(seen, Sample::Alone(0), terms, work, &mut painter.outlook);
-        *background = *terms;
+        painter.look_beside();
     }
     match camera.sampling() {
         Sampling::Centre => painter.centres(range, target),
@@ -273,6 +282,17 @@ struct Painter<'a, 's> {
 }
 
 impl<'a> Painter<'a, '_> {
+    /// What parallel rays have in common: their line, and what they see beside the object.
+    #[inline(never)]
+    fn look_beside(&mut self) {
+        let ray = self.camera.ray(0.0, 0.0);
+        self.primary.line = Line::new(&ray);
+        let Board { terms, work, background, .. } = &mut *self.board;
+        self.solved.radiance_with((&ray, None), Sample::Alone(0), terms, work, &mut self.outlook);
+        *background = *terms;
+    }
+
+    #[inline(never)]
     fn centres(&mut self, range: Range<usize>, target: &mut Target<'_>) {
         let columns = self.camera.columns();
         for (i, row) in range.enumerate() {
@@ -287,6 +307,7 @@ impl<'a> Painter<'a, '_> {
         }
     }
 
+    #[inline(never)]
     fn areas(&mut self, range: Range<usize>, target: &mut Target<'_>) {
         let columns = self.camera.columns() as isize;
         let (first, last) = (range.start as isize, range.end as isize);
@@ -315,6 +336,7 @@ impl<'a> Painter<'a, '_> {
 
     /// Finds the unevenness about all pixels of a row, and the error that each of its uneven ones may have for the
     /// row's root mean square to be a small part of the tolerance.
+    #[inline(never)]
     fn goal(&mut self, row: isize, columns: isize) -> f64 {
         let tolerance = self.solved.settings.tolerance;
         let (mut object, mut uneven) = (0.0, 0.0);
@@ -356,6 +378,7 @@ impl<'a> Painter<'a, '_> {
 
     /// Computes the centres of a row: `each` finds the terms of each range of pixels on the board, of pixel after pixel or
     /// many of the background.
+    #[inline(never)]
     fn line(
         &mut self,
         row: isize,
@@ -570,6 +593,7 @@ impl<'a> Painter<'a, '_> {
     }
 
     /// The mean over a pixel's square of scattered rays, as many as their contrast asks for.
+    #[inline(never)]
     fn scatter(
         &mut self,
         target: &mut Target<'_>,

@@ -124,6 +124,11 @@ impl Surface {
         Some(Mirror { class, lobe: scene.gloss(self.material).and_then(|ratio| Lobe::new(ratio).ok()) })
     }
 
+    /// Whether its material is an ideal mirror.
+    pub fn is_ideal(&self, scene: &Scene<'_>) -> bool {
+        scene.mirror(self.material) != NO_MIRROR && scene.gloss(self.material).is_none()
+    }
+
     /// The direction toward the light for a ray that arrived along `direction`, and the share of the class's
     /// mirror reflectance that applies: 1 for an ideal mirror, the lobe's albedo over rho_0 for a lobe, of
     /// which `u`, `v` choose the ray.

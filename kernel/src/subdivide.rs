@@ -360,6 +360,14 @@ impl Probe<'_> {
         if !clear.prove_whole(self.scene, self.facing, &receiver, MOST_CLOSED) {
             return None;
         }
+        Some(self.closed_residuals(&receiver, &clear, points))
+    }
+
+    /// The same of a triangle for which all that is clear is known.
+    // apart: its sums do not burden the stack of the proof
+    #[inline(never)]
+    fn closed_residuals(&self, receiver: &Receiver, clear: &Clear<'_>, points: &[Vec3; POINTS]) -> f64 {
+        let Receiver { facet, side, normal, .. } = *receiver;
         let mut sums = [1.0; POINTS];
         let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
         for other in self.facing.before(facet, side) {
@@ -383,7 +391,7 @@ impl Probe<'_> {
         }
         together.take(self.bvh.isa(), points, normal, &mut sums);
         let half = sums.map(|sum| 0.5 * sum);
-        Some(residuals(&half, &sums, &[true; POINTS], 0.5).0)
+        residuals(&half, &sums, &[true; POINTS], 0.5).0
     }
 
     /// One ray from each point of the facet side that `from` stands for, all along one direction.

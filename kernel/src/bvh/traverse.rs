@@ -346,7 +346,8 @@ impl Walk {
     }
 
     /// Takes the hit with one facet where it is better than the best so far.
-    #[inline(always)]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline(always))]
     fn facet(&mut self, bvh: &Bvh, ray: &Ray, facet: u32, best: &mut Option<Hit>) {
         let Some(&[a, b, c, normal]) = bvh.solids.get(facet as usize) else { return };
         let Some(line) = Line::new(ray) else { return };
@@ -414,7 +415,8 @@ impl<L: Lanes> Beam<L> {
     }
 
     /// Which of eight facets may have the ray inside, as bits; not the one to skip.
-    #[inline(always)]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline(always))]
     pub fn inside(&self, (packet, slack, facets): (&Packet, &Slack, &[u32; LANES])) -> u32 {
         let lanes = self.lanes;
         let [a, b, c] = [self.image(&packet[0]), self.image(&packet[1]), self.image(&packet[2])];

@@ -91,7 +91,8 @@ impl<'m> Outlook<'m> {
     /// The facets that may stand in the way of rays that leave the flat `surface`'s side along `direction`, or along any
     /// that is within an angle of sine `spread` of it (toward an image of the sun: mirrors among them that may show it);
     /// `None` where that is not known, or they are many.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn before(
         &mut self,
         solved: &Solved<'_>,
@@ -176,6 +177,7 @@ impl Solved<'_> {
 }
 
 /// Whether any line from `point` within an angle of sine `spread` of the unit vector `axis` may meet a facet.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
 pub(super) fn may_meet(corners: &[Vec3; 3], point: Vec3, axis: Vec3, spread: f64) -> bool {
     let [a, b, c] = *corners;
     let farthest = [a, b, c].iter().map(|&corner| (corner - point).length_squared()).fold(0.0, f64::max);

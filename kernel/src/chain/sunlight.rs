@@ -27,7 +27,8 @@ const MOST_DISC_RAYS: u32 = 1024;
 
 impl Solved<'_> {
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn sun_cosine(
         &self,
         leg: &Leg<'_>,
@@ -201,7 +202,7 @@ impl Solved<'_> {
                 return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SAME;
             };
             let Some(surface) = Surface::of_hit(self.scene, &hit) else { return false };
-            if mirrors >= most || surface.mirror(self.scene).is_none_or(|m| m.lobe.is_some()) {
+            if mirrors >= most || !surface.is_ideal(self.scene) {
                 return false;
             }
             let mut largest = 0.0;
@@ -226,6 +227,7 @@ impl Solved<'_> {
     }
 
     /// The sun in a lobe, evaluated directly: E q(sun, view) V.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     pub(super) fn add_sun_gloss(&self, leg: &Leg<'_>, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
         let toward: Vec3 = sun.direction();
