@@ -18,6 +18,7 @@
 //! a span is half the difference of the sines. One spectral band: more bands are more runs. Lengths are in any
 //! unit, radiance in any; E, the sun's normal irradiance, is radiance times angle.
 
+mod fork;
 #[cfg(feature = "std")]
 pub mod host;
 pub mod image;

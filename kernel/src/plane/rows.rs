@@ -259,10 +259,8 @@ impl Station<'_> {
                 for i in 0..chains {
                     let part = (f64::from(i) + 0.5) / f64::from(chains);
                     let leg = self.leg(from + (to - from) * part, weight / f64::from(chains));
-                    if let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip).filter(|h| h.front)
-                        && let Some(next) = self.chains.reflected(&hit, leg, sink, scratch)
-                    {
-                        self.chains.follow(next, sink, scratch);
+                    if let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip).filter(|h| h.front) {
+                        self.chains.reflect(&hit, leg, sink, scratch);
                     }
                 }
             }

@@ -342,6 +342,11 @@ impl<'m> PlaneScene<'m> {
         material.rays().map(|rays| (&material.lobe, rays))
     }
 
+    /// Whether any material has a lobe.
+    pub fn is_glossy(&self) -> bool {
+        self.bodies.iter().any(|body| self.lobe(body.material).is_some())
+    }
+
     /// Whether any material mirrors.
     pub fn mirrors(&self) -> bool {
         self.bodies.iter().any(|b| self.specular(b.material) > 0.0)

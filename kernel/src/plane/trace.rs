@@ -1,10 +1,12 @@
 //! First hits, and chains by way of mirrors and lobes.
 
-use crate::math::{cos, fabs, sin, sqrt};
+use crate::index::Index;
+use crate::math::{fabs, sqrt};
+use crate::plane::fork::Fork;
 use crate::plane::lobe::PlaneLobe;
-use crate::plane::scene::{NOWHERE, PlaneScene, Primitive, RaySet};
-use crate::plane::view::{Scratch, sweep};
-use crate::plane::{Vec2, cross, length, reflect, toward, turned};
+use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
+use crate::plane::view::Scratch;
+use crate::plane::{Vec2, cross, length, reflect};
 use crate::quadrature::rule;
 
 /// A first hit.
@@ -141,32 +143,82 @@ pub(crate) struct Chains<'a> {
 
 /// No chain is longer, whatever its reflectances.
 const LONGEST: u32 = 100_000;
-/// No path has more lobes: each is a level of recursion.
-const MOST_LOBES: u32 = 64;
+/// No path has more lobes.
+pub(super) const MOST_LOBES: u32 = 64;
 
 impl Chains<'_> {
     /// Follows a ray and all that its reflections make of it.
-    pub fn follow<S: Sink>(&self, mut leg: Leg, sink: &mut S, scratch: &mut Scratch<'_>) {
+    pub fn follow<S: Sink>(&self, leg: Leg, sink: &mut S, scratch: &mut Scratch<'_>) {
+        self.go_on(Some(leg), 0, sink, scratch);
+    }
+
+    /// Follows all that the reflection of a ray at a hit makes of it.
+    pub fn reflect<S: Sink>(&self, hit: &Hit, leg: Leg, sink: &mut S, scratch: &mut Scratch<'_>) {
+        let mut forks = 0;
+        let next = self.reflected(hit, leg, &mut forks, sink, scratch);
+        self.go_on(next, forks, sink, scratch);
+    }
+
+    /// Follows a ray, and those that the lobes under way have left.
+    #[inline(never)]
+    fn go_on<S: Sink>(
+        &self,
+        mut next: Option<Leg>,
+        mut forks: usize,
+        sink: &mut S,
+        scratch: &mut Scratch<'_>,
+    ) {
         loop {
-            let Some(hit) = self.scene.first(leg.origin, leg.direction, leg.skip) else {
-                return sink.escape(&leg);
-            };
-            if !hit.front {
-                return sink.back();
+            while let Some(leg) = next {
+                next = self.step(leg, &mut forks, sink, scratch);
             }
-            sink.meet(&hit, &leg);
-            match self.reflected(&hit, leg, sink, scratch) {
-                Some(next) => leg = next,
-                None => return,
+            next = self.resume(&mut forks, sink, scratch);
+            if next.is_none() {
+                return;
             }
         }
     }
 
+    /// Follows a ray to the next hit: the mirrored ray, or `None` where the chain ends or a lobe has taken over.
+    #[inline(always)]
+    fn step<S: Sink>(
+        &self,
+        leg: Leg,
+        forks: &mut usize,
+        sink: &mut S,
+        scratch: &mut Scratch<'_>,
+    ) -> Option<Leg> {
+        let Some(hit) = self.scene.first(leg.origin, leg.direction, leg.skip) else {
+            sink.escape(&leg);
+            return None;
+        };
+        if !hit.front {
+            sink.back();
+            return None;
+        }
+        sink.meet(&hit, &leg);
+        self.reflected(&hit, leg, forks, sink, scratch)
+    }
+
+    /// The next ray of the lobes under way, those met last first.
+    fn resume<S: Sink>(&self, forks: &mut usize, sink: &mut S, scratch: &mut Scratch<'_>) -> Option<Leg> {
+        while let Some(last) = forks.checked_sub(1) {
+            let (fork, spans) = scratch.under_way(last)?;
+            if let Some(leg) = fork.next(self, spans, sink) {
+                return Some(leg);
+            }
+            scratch.leave(last);
+            *forks = last;
+        }
+        None
+    }
+
     /// Goes on from a hit: the mirrored ray, or `None` where the chain ends or a lobe has taken over.
-    pub fn reflected<S: Sink>(
+    fn reflected<S: Sink>(
         &self,
         hit: &Hit,
         leg: Leg,
+        forks: &mut usize,
         sink: &mut S,
         scratch: &mut Scratch<'_>,
     ) -> Option<Leg> {
@@ -184,148 +236,78 @@ impl Chains<'_> {
         let next = Leg { origin, direction, skip, through, depth, ..leg };
         match self.scene.lobe(material) {
             None => Some(next),
-            Some((lobe, rays)) => {
+            Some((lobe, _)) => {
                 sink.glossy(hit, direction, lobe, &next);
                 let next = Leg { lobes: leg.lobes + 1, ..next };
-                self.branch(hit, next, lobe, rays, sink, scratch);
+                let fork = Fork::new(self, hit, &next, material, scratch)?;
+                scratch.enter(forks, fork);
                 None
             }
         }
     }
+}
 
-    /// The leg's share of a lobe's energy along `direction`. At a path's first two lobes the chain's floor shrinks
-    /// with the share: what the reflectances leave decides where it ends, not into how many rays a lobe is split.
-    /// Beyond, small shares end, so that trees that branch at every lobe are finite.
-    fn part(leg: &Leg, direction: Vec2, share: f64) -> Leg {
-        let floor = if leg.lobes <= 2 { leg.floor * share } else { leg.floor };
-        Leg { direction, through: leg.through * share, floor, ..*leg }
-    }
-
-    /// The rays that stand for a lobe around `leg.direction`.
-    fn branch<S: Sink>(
-        &self,
-        hit: &Hit,
-        leg: Leg,
-        lobe: &PlaneLobe,
-        rays: RaySet,
-        sink: &mut S,
-        scratch: &mut Scratch<'_>,
-    ) {
-        let count = |counts: [u32; 3]| counts[(leg.lobes as usize - 1).min(2)] as usize;
-        let visible = lobe.visible(leg.direction, hit.normal);
-        match rays {
-            RaySet::Paper { spacing, renormalised } => {
-                self.paper(hit, leg, lobe, (spacing, renormalised), sink, scratch);
-            }
-            RaySet::Gauss(counts) => {
-                let width = visible.high - visible.low;
-                nodes(count(counts), |x, w| {
-                    let direction = lobe.direction(leg.direction, visible.low + width * x);
-                    self.follow(Self::part(&leg, direction, 0.5 * width * w), sink, scratch);
-                });
-            }
-            RaySet::Equal(counts) => {
-                let (n, width) = (count(counts), visible.high - visible.low);
-                for i in 0..n {
-                    let x = (i as f64 + 0.5) / n as f64;
-                    let direction = lobe.direction(leg.direction, visible.low + width * x);
-                    self.follow(Self::part(&leg, direction, 0.5 * width / n as f64), sink, scratch);
-                }
-            }
-            RaySet::Split(counts) => {
-                let n = count(counts);
-                let Some((spans, mut rest)) =
-                    sweep(self.scene, hit.point, hit.normal, hit.primitive, self.cuts, scratch)
-                else {
-                    let whole = RaySet::Gauss([n as u32; 3]);
-                    return self.branch(hit, leg, lobe, whole, sink, scratch);
-                };
-                for span in spans {
-                    let at = |s: f64| lobe.place(leg.direction, toward(hit.normal, s), &visible);
-                    let (low, high) = (at(span.from), at(span.to));
-                    let sky = span.primitive == NOWHERE;
-                    if high <= low {
-                        continue;
-                    }
-                    graded(if sky { self.sky_nodes } else { n }, |x, w| {
-                        let direction = lobe.direction(leg.direction, low + (high - low) * x);
-                        let ray = Self::part(&leg, direction, 0.5 * (high - low) * w);
-                        if sky { sink.escape(&ray) } else { self.follow(ray, sink, &mut rest) }
-                    });
-                }
-            }
-        }
-    }
-
-    /// Three rays as eq. (18) has them.
-    fn paper<S: Sink>(
-        &self,
-        hit: &Hit,
-        leg: Leg,
-        lobe: &PlaneLobe,
-        (spacing, renormalised): (f64, bool),
-        sink: &mut S,
-        scratch: &mut Scratch<'_>,
-    ) {
-        let (s, c) = (sin(0.5 * spacing), cos(0.5 * spacing));
-        let ratio = lobe.value(s, c) / lobe.value(0.0, 1.0);
-        let side = turned(leg.direction) * s;
-        let ahead = leg.direction * c;
-        let rays = [(leg.direction, 1.0), (ahead + side, ratio), (ahead - side, ratio)];
-        let rises = |d: Vec2| d.dot(hit.normal) > 0.0;
-        let share = if renormalised {
-            let above: f64 = rays.iter().filter(|r| rises(r.0)).map(|r| r.1).sum();
-            if above > 0.0 { lobe.albedo(leg.direction.dot(hit.normal)) / above } else { 0.0 }
-        } else {
-            1.0 / (1.0 + 2.0 * ratio)
-        };
-        for (direction, weight) in rays {
-            if rises(direction) {
-                self.follow(Self::part(&leg, direction, weight * share), sink, scratch);
-            }
-        }
+/// Nodes of the Gauss rule of exactly `n` points for n <= 3 and any `n` of [`rule`], else of panels of the 4-point rule or
+/// the next larger number of points.
+pub(crate) fn points(n: usize) -> usize {
+    match n {
+        0..=1 => 1,
+        2..=3 => n,
+        4..=32 => rule(n).0.len(),
+        _ => 32 * n.div_ceil(32),
     }
 }
 
-/// Calls `f` with the nodes and weights on (0, 1) of a Gauss rule of exactly `n` points for n <= 3 and any `n` of
-/// [`rule`], else of panels of the 4-point rule or the next larger number of points.
-pub(crate) fn nodes(n: usize, mut f: impl FnMut(f64, f64)) {
+/// One of the nodes of that rule on (0, 1), and its weight.
+pub(crate) fn node(n: usize, number: usize) -> (f64, f64) {
     /// Half the distances of the 2- and 3-point rules' outer nodes.
     const OFF: [f64; 2] = [0.288_675_134_594_812_9, 0.387_298_334_620_741_7];
-    match n {
-        0..=1 => f(0.5, 1.0),
-        2 => {
-            f(0.5 - OFF[0], 0.5);
-            f(0.5 + OFF[0], 0.5);
-        }
-        3 => {
-            f(0.5 - OFF[1], 5.0 / 18.0);
-            f(0.5, 4.0 / 9.0);
-            f(0.5 + OFF[1], 5.0 / 18.0);
-        }
-        4..=32 => {
+    match (n, number) {
+        (0..=1, _) => (0.5, 1.0),
+        (2, 0) => (0.5 - OFF[0], 0.5),
+        (2, _) => (0.5 + OFF[0], 0.5),
+        (3, 0) => (0.5 - OFF[1], 5.0 / 18.0),
+        (3, 1) => (0.5, 4.0 / 9.0),
+        (3, _) => (0.5 + OFF[1], 5.0 / 18.0),
+        (4..=32, _) => {
             let (at, weights) = rule(n);
-            at.iter().zip(weights).for_each(|(&x, &w)| f(x, w));
+            (at.at(number), weights.at(number))
         }
         _ => {
-            let panels = n.div_ceil(32);
+            let panels = n.div_ceil(32) as f64;
             let (at, weights) = rule(32);
-            for panel in 0..panels {
-                for (x, w) in at.iter().zip(weights) {
-                    f((panel as f64 + x) / panels as f64, w / panels as f64);
-                }
-            }
+            (((number / 32) as f64 + at.at(number % 32)) / panels, weights.at(number % 32) / panels)
         }
     }
 }
 
-/// Calls `f` with the nodes and weights on (0, 1) of a rule whose nodes crowd at both ends, where what is
-/// integrated has square roots: silhouettes. One node is the middle.
-pub(crate) fn graded(n: usize, mut f: impl FnMut(f64, f64)) {
-    if n < 3 {
-        return nodes(n, f);
+/// Calls `f` with all nodes and weights of that rule.
+pub(crate) fn nodes(n: usize, mut f: impl FnMut(f64, f64)) {
+    for number in 0..points(n) {
+        let (x, w) = node(n, number);
+        f(x, w);
     }
+}
+
+/// A node on (0, 1) of a rule whose nodes crowd at both ends, where what is integrated has square roots: silhouettes. One
+/// node is the middle. `sum` is that of [`graded_sum`].
+pub(crate) fn graded_node(n: usize, number: usize, sum: f64) -> (f64, f64) {
+    let (x, w) = node(n, number);
+    if n < 3 { (x, w) } else { (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * w / sum) }
+}
+
+/// What makes the weights of that rule's nodes sum to 1.
+pub(crate) fn graded_sum(n: usize) -> f64 {
     let mut sum = 0.0;
     nodes(n, |x, w| sum += 6.0 * x * (1.0 - x) * w);
-    nodes(n, |x, w| f(x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * w / sum));
+    sum
+}
+
+/// Calls `f` with all nodes and weights of that rule.
+pub(crate) fn graded(n: usize, mut f: impl FnMut(f64, f64)) {
+    let sum = graded_sum(n);
+    for number in 0..points(n) {
+        let (x, w) = graded_node(n, number, sum);
+        f(x, w);
+    }
 }

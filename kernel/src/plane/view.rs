@@ -4,7 +4,9 @@ use crate::arena::{Arena, Need, plain_struct};
 use crate::error::Error;
 use crate::index::{Index, IndexMut};
 use crate::math::sqrt;
+use crate::plane::fork::Fork;
 use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
+use crate::plane::trace::MOST_LOBES;
 use crate::plane::{Vec2, cross, length, toward};
 use crate::sort::sort;
 
@@ -45,6 +47,10 @@ pub struct Scratch<'m> {
     spans: &'m mut [Span],
     /// Entries of one sweep in `events`, `active` and `spans`.
     room: [usize; 3],
+    /// Sweeps of lobes under way.
+    level: usize,
+    /// Lobes that a path has met.
+    forks: &'m mut [Fork],
 }
 
 impl<'m> Scratch<'m> {
@@ -57,7 +63,13 @@ impl<'m> Scratch<'m> {
     /// Bytes for sweeps of a scene with at most `cuts` further cuts.
     pub fn bytes(scene: &PlaneScene<'_>, cuts: usize) -> Result<usize, Error> {
         let [events, active, spans] = Scratch::room(scene, cuts).map(|n| n.saturating_mul(LEVELS));
-        Need::new().and::<Event>(events).and::<u32>(active).and::<Span>(spans).bytes()
+        let need = Need::new().and::<Event>(events).and::<u32>(active).and::<Span>(spans);
+        need.and::<Fork>(Scratch::lobes(scene)).bytes()
+    }
+
+    /// Lobes of a path.
+    fn lobes(scene: &PlaneScene<'_>) -> usize {
+        if scene.is_glossy() { MOST_LOBES as usize } else { 0 }
     }
 
     /// Working memory in the caller's.
@@ -69,6 +81,8 @@ impl<'m> Scratch<'m> {
             active: arena.take(room[1] * LEVELS)?,
             spans: arena.take(room[2] * LEVELS)?,
             room,
+            level: 0,
+            forks: arena.take(Scratch::lobes(scene))?,
         })
     }
 
@@ -79,17 +93,69 @@ impl<'m> Scratch<'m> {
 
     fn fits(&self, scene: &PlaneScene<'_>, cuts: usize) -> bool {
         Scratch::room(scene, cuts).iter().zip(self.room).all(|(needed, room)| *needed <= room)
+            && Scratch::lobes(scene) <= self.forks.len()
     }
 
-    /// One sweep's part, and the rest for the sweeps within; `None` where all levels are under way.
-    fn split(&mut self) -> Option<(Scratch<'_>, Scratch<'_>)> {
+    /// One sweep's part, and the rest for the sweeps within; `None` where there is none.
+    fn split(&mut self) -> Option<(Part<'_>, Scratch<'_>)> {
         let room = self.room;
         let (events, more_events) = self.events.split_at_mut_checked(room[0])?;
         let (active, more_active) = self.active.split_at_mut_checked(room[1])?;
         let (spans, more_spans) = self.spans.split_at_mut_checked(room[2])?;
-        let rest = Scratch { events: more_events, active: more_active, spans: more_spans, room };
-        Some((Scratch { events, active, spans, room }, rest))
+        let forks = &mut *self.forks;
+        let rest =
+            Scratch { events: more_events, active: more_active, spans: more_spans, room, level: 0, forks };
+        Some((Part { events, active, spans }, rest))
     }
+
+    /// Sweeps from where a lobe is met, which is then under way; the number of spans, or `None` where no memory is left or
+    /// it is another scene's.
+    pub(super) fn nested(
+        &mut self,
+        scene: &PlaneScene<'_>,
+        x: Vec2,
+        n: Vec2,
+        skip: u32,
+        cuts: &[Vec2],
+    ) -> Option<usize> {
+        if !self.fits(scene, cuts.len()) {
+            return None;
+        }
+        let [events, active, spans] = self.room.map(|room| self.level * room..(self.level + 1) * room);
+        let mut mine = Part {
+            events: self.events.get_mut(events)?,
+            active: self.active.get_mut(active)?,
+            spans: self.spans.get_mut(spans)?,
+        };
+        self.level += 1;
+        Some(mine.sweep(scene, x, n, skip, cuts))
+    }
+
+    /// Keeps a lobe under way.
+    pub(super) fn enter(&mut self, forks: &mut usize, fork: Fork) {
+        self.forks.set(*forks, fork);
+        *forks += 1;
+    }
+
+    /// The lobe under way that was met last, and the spans of its sweep.
+    pub(super) fn under_way(&mut self, last: usize) -> Option<(&mut Fork, &[Span])> {
+        let fork = self.forks.get_mut(last)?;
+        let own = self.level.saturating_sub(1) * self.room[2];
+        Some((fork, self.spans.part(own..self.level * self.room[2])))
+    }
+
+    /// That lobe is done.
+    pub(super) fn leave(&mut self, last: usize) {
+        let split = self.forks.get(last).is_some_and(|fork| fork.spans > 0);
+        self.level = self.level.saturating_sub(usize::from(split));
+    }
+}
+
+/// Memory of one sweep.
+struct Part<'s> {
+    events: &'s mut [Event],
+    active: &'s mut [u32],
+    spans: &'s mut [Span],
 }
 
 /// The spans that the point `x` on primitive `skip` sees above its normal `n`, in the order of rising sines,
@@ -106,33 +172,41 @@ pub fn sweep<'s>(
     if !scratch.fits(scene, cuts.len()) {
         return None;
     }
-    let (mine, rest) = scratch.split()?;
-    let mut count = 0;
-    for body in scene.bodies() {
-        for index in body.first..body.first + body.count {
-            let Some(p) = scene.primitives().get(index as usize).filter(|_| index != skip) else { continue };
-            if let Some((from, to)) = extent(p, x, n, body.closed == 1)
-                && to > from
-            {
-                mine.events.set(count, Event { at: from, primitive: index, begins: 1 });
-                mine.events.set(count + 1, Event { at: to, primitive: index, begins: 0 });
-                count += 2;
+    let (mut mine, rest) = scratch.split()?;
+    let count = mine.sweep(scene, x, n, skip, cuts);
+    Some((mine.spans.head(count), rest))
+}
+
+impl Part<'_> {
+    /// See [`sweep`]; the number of spans.
+    fn sweep(&mut self, scene: &PlaneScene<'_>, x: Vec2, n: Vec2, skip: u32, cuts: &[Vec2]) -> usize {
+        let mut count = 0;
+        for body in scene.bodies() {
+            for index in body.first..body.first + body.count {
+                let Some(p) = scene.primitives().get(index as usize).filter(|_| index != skip) else {
+                    continue;
+                };
+                if let Some((from, to)) = extent(p, x, n, body.closed == 1)
+                    && to > from
+                {
+                    self.events.set(count, Event { at: from, primitive: index, begins: 1 });
+                    self.events.set(count + 1, Event { at: to, primitive: index, begins: 0 });
+                    count += 2;
+                }
             }
         }
-    }
-    for cut in cuts.iter().filter(|cut| cut.dot(n) > 0.0) {
-        mine.events.set(count, Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 });
-        count += 1;
-    }
-    let events = mine.events.head_mut(count);
-    sort(events, &|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
-    let spans = if count > 0 {
-        walk(scene, x, n, events, mine.active, mine.spans)
-    } else {
-        mine.spans.set(0, Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 });
+        for cut in cuts.iter().filter(|cut| cut.dot(n) > 0.0) {
+            self.events.set(count, Event { at: cross(n, *cut), primitive: NOWHERE, begins: 0 });
+            count += 1;
+        }
+        let events = self.events.head_mut(count);
+        sort(events, &|a, b| a.at.total_cmp(&b.at).then(a.primitive.cmp(&b.primitive)));
+        if count > 0 {
+            return walk(scene, x, n, events, self.active, self.spans);
+        }
+        self.spans.set(0, Span { from: -1.0, to: 1.0, primitive: NOWHERE, unused: 0 });
         1
-    };
-    Some((mine.spans.head(spans), rest))
+    }
 }
 
 /// Walks from silhouette to silhouette and keeps what begins and ends.
