@@ -41,7 +41,7 @@ RULES = [
     # an image's rows are integrals of integrals
     (r"^blik_kernel::image::lines::integrate$", r"^blik_kernel::image::Painter::lines_across::"),
     # skies of the plane model, the caller's among them
-    (r"^blik_kernel::plane::(trace::Chains::go_on|rows::Station)|^<blik_kernel::plane::\w+::\w+ as blik_kernel::plane::trace::Sink>::escape$", r"^blik::plane::solution::(asking|DARK)\b"),
+    (r"^<?blik_kernel::plane::", r"^blik::plane::solution::(asking|DARK)\b"),
     (r"^blik::plane::solution::asking::", ""),
 ]
 # Never called by address: entries of tables for closures that are consumed, which nobody does.

@@ -79,6 +79,7 @@ pub(super) struct Fineness<'a> {
 /// `value` fills in the vector at a place and returns its squared error; `None` ends it all. An interval counts by the
 /// trapezoid rule once its ends, or its middle and its ends' mean, differ so little that the jump which that would
 /// be brings no more than the goal.
+#[inline(never)]
 pub(super) fn integrate(
     measure: &Measure<'_>,
     fineness: &Fineness<'_>,

@@ -2,6 +2,7 @@
 //! takes no stack.
 
 use crate::arena::plain_struct;
+use crate::index::Index;
 use crate::math::{cos, sin};
 use crate::plane::lobe::{PlaneLobe, Visible};
 use crate::plane::scene::{NOWHERE, RaySet};
@@ -26,7 +27,8 @@ plain_struct! {
         pub visible: [f64; 2],
         /// The part under way: all that is visible, or what one span takes of it.
         pub part: [f64; 2],
-        /// Sum of the weights of the part's nodes; of the paper's three rays, the share of the middle one.
+        /// Sum of the weights of the part's nodes; of the paper's three rays, the share of the middle one, and `part` holds
+        /// the angle between the others.
         pub sum: f64,
         /// The primitive.
         pub primitive: u32,
@@ -46,10 +48,23 @@ plain_struct! {
         pub spans: u32,
         /// 1 where the part's span shows the sky.
         pub sky: u32,
+        /// What the part's rays are: [`EVEN`], [`NODES`], [`GRADED`] or [`PAPER`].
+        pub kind: u32,
+        /// Points asked of the part's rule.
+        pub wanted: u32,
         /// Keeps the size a multiple of eight.
         pub unused: u32,
     }
 }
+
+/// Midpoints of equal shares.
+const EVEN: u32 = 0;
+/// Gauss nodes.
+const NODES: u32 = 1;
+/// Gauss nodes that crowd at both ends.
+const GRADED: u32 = 2;
+/// Eq. (18).
+const PAPER: u32 = 3;
 
 impl Fork {
     /// The lobe around `leg.direction` that is met at `hit`, `leg.lobes` counting it.
@@ -78,29 +93,35 @@ impl Fork {
         };
         match rays {
             RaySet::Paper { spacing, renormalised } => {
-                fork.sum = fork.paper_share(lobe, spacing, renormalised);
-                fork.rays = 3;
+                fork.part[0] = spacing;
+                fork.sum = fork.paper_share(lobe, renormalised);
+                (fork.kind, fork.rays) = (PAPER, 3);
             }
-            RaySet::Gauss(counts) => fork.rays = points(fork.count(counts)) as u32,
-            RaySet::Equal(counts) => fork.rays = fork.count(counts) as u32,
+            RaySet::Gauss(counts) => fork.ask(NODES, fork.count(counts)),
+            RaySet::Equal(counts) => (fork.kind, fork.rays) = (EVEN, fork.count(counts)),
             RaySet::Split(counts) => {
                 match scratch.nested(chains.scene, hit.point, hit.normal, hit.primitive, chains.cuts) {
                     Some(spans) => fork.spans = spans as u32,
-                    None => fork.rays = points(fork.count(counts)) as u32,
+                    None => fork.ask(NODES, fork.count(counts)),
                 }
             }
         }
         Some(fork)
     }
 
+    /// Takes the nodes of a rule for the part's rays.
+    fn ask(&mut self, kind: u32, wanted: u32) {
+        (self.kind, self.wanted, self.ray, self.rays) = (kind, wanted, 0, points(wanted as usize) as u32);
+    }
+
     /// Rays by the place of the lobe in its path.
-    fn count(&self, counts: [u32; 3]) -> usize {
+    fn count(&self, counts: [u32; 3]) -> u32 {
         let [first, second, later] = counts;
-        (match self.lobes {
+        match self.lobes {
             0..=1 => first,
             2 => second,
             _ => later,
-        }) as usize
+        }
     }
 
     /// A ray that carries the share `share` of the lobe's energy. At a path's first two lobes the chain's floor shrinks with
@@ -121,67 +142,69 @@ impl Fork {
 
     /// The next ray to follow; rays toward the sky go to the sink. `spans` are those of the lobe's own sweep.
     pub(super) fn next<S: Sink>(&mut self, chains: &Chains<'_>, spans: &[Span], sink: &mut S) -> Option<Leg> {
-        let (lobe, rays) = chains.scene.lobe(self.material)?;
+        let lobe = chains.scene.lobe_alone(self.material)?;
         loop {
-            if self.ray >= self.rays && !self.next_span(chains, lobe, rays, spans) {
+            if self.ray >= self.rays && !self.next_span(chains, lobe, spans) {
                 return None;
             }
             let number = self.ray as usize;
             self.ray += 1;
-            let ([low, high], direction) = (self.part, Vec2::from(self.direction));
-            let at = |x: f64| lobe.direction(direction, low + (high - low) * x);
-            match rays {
-                RaySet::Paper { spacing, .. } => {
-                    let (ray, weight) = self.paper_ray(lobe, spacing, number);
-                    if ray.dot(Vec2::from(self.normal)) > 0.0 {
-                        return Some(self.leg(ray, weight * self.sum));
-                    }
+            if self.kind == PAPER {
+                let (ray, weight) = self.paper_ray(lobe, number);
+                if ray.dot(Vec2::from(self.normal)) > 0.0 {
+                    return Some(self.leg(ray, weight * self.sum));
                 }
-                RaySet::Equal(_) => {
-                    let n = f64::from(self.rays);
-                    return Some(self.leg(at((number as f64 + 0.5) / n), 0.5 * (high - low) / n));
-                }
-                RaySet::Split(counts) if self.spans > 0 => {
-                    let n = if self.sky == 1 { chains.sky_nodes } else { self.count(counts) };
-                    let (x, w) = graded_node(n, number, self.sum);
-                    let ray = self.leg(at(x), 0.5 * (high - low) * w);
-                    if self.sky == 0 {
-                        return Some(ray);
-                    }
-                    sink.escape(&ray);
-                }
-                RaySet::Gauss(counts) | RaySet::Split(counts) => {
-                    let (x, w) = node(self.count(counts), number);
-                    return Some(self.leg(at(x), 0.5 * (high - low) * w));
-                }
+                continue;
             }
+            let [low, high] = self.part;
+            let (n, width) = (self.wanted as usize, high - low);
+            let (x, share) = match self.kind {
+                EVEN => {
+                    let n = f64::from(self.rays);
+                    ((number as f64 + 0.5) / n, 0.5 * width / n)
+                }
+                NODES => {
+                    let (x, w) = node(n, number);
+                    (x, 0.5 * width * w)
+                }
+                _ => {
+                    let (x, w) = graded_node(n, number, self.sum);
+                    (x, 0.5 * width * w)
+                }
+            };
+            let ray = self.leg(lobe.direction(Vec2::from(self.direction), low + width * x), share);
+            if self.sky == 0 {
+                return Some(ray);
+            }
+            sink.escape(&ray);
         }
     }
 
     /// Goes on to the next span that takes a part of the lobe.
-    fn next_span(&mut self, chains: &Chains<'_>, lobe: &PlaneLobe, rays: RaySet, spans: &[Span]) -> bool {
-        let RaySet::Split(counts) = rays else { return false };
+    fn next_span(&mut self, chains: &Chains<'_>, lobe: &PlaneLobe, spans: &[Span]) -> bool {
         let [low, high] = self.visible;
         let at = |s: f64| {
             let d = toward(Vec2::from(self.normal), s);
             lobe.place(Vec2::from(self.direction), d, &Visible { low, high })
         };
-        while let Some(span) = spans.get(self.span as usize).filter(|_| self.span < self.spans) {
-            self.span += 1;
-            let (low, high) = (at(span.from), at(span.to));
-            if high > low {
-                self.sky = u32::from(span.primitive == NOWHERE);
-                let n = if self.sky == 1 { chains.sky_nodes } else { self.count(counts) };
-                (self.part, self.ray, self.rays) = ([low, high], 0, points(n) as u32);
-                self.sum = graded_sum(n);
-                return true;
-            }
-        }
-        false
+        let rest = spans.part(self.span as usize..self.spans as usize);
+        let mut parts = rest.iter().zip(1..).map(|(span, done)| (span, done, at(span.from), at(span.to)));
+        let Some((span, done, low, high)) = parts.find(|(_, _, low, high)| high > low) else { return false };
+        let sky = span.primitive == NOWHERE;
+        let own = match chains.scene.lobe(self.material) {
+            Some((_, RaySet::Split(counts))) => self.count(counts),
+            _ => 1,
+        };
+        let wanted = if sky { chains.sky_nodes as u32 } else { own };
+        (self.span, self.sky, self.part) = (self.span + done, u32::from(sky), [low, high]);
+        self.sum = graded_sum(wanted as usize);
+        self.ask(GRADED, wanted);
+        true
     }
 
     /// One of the three rays of eq. (18), and its weight.
-    fn paper_ray(&self, lobe: &PlaneLobe, spacing: f64, number: usize) -> (Vec2, f64) {
+    fn paper_ray(&self, lobe: &PlaneLobe, number: usize) -> (Vec2, f64) {
+        let [spacing, _] = self.part;
         let (s, c) = (sin(0.5 * spacing), cos(0.5 * spacing));
         let ratio = lobe.value(s, c) / lobe.value(0.0, 1.0);
         let direction = Vec2::from(self.direction);
@@ -194,8 +217,8 @@ impl Fork {
     }
 
     /// What of the lobe's energy goes by the weight of 1.
-    fn paper_share(&self, lobe: &PlaneLobe, spacing: f64, renormalised: bool) -> f64 {
-        let rays = [0, 1, 2].map(|number| self.paper_ray(lobe, spacing, number));
+    fn paper_share(&self, lobe: &PlaneLobe, renormalised: bool) -> f64 {
+        let rays = [0, 1, 2].map(|number| self.paper_ray(lobe, number));
         let normal = Vec2::from(self.normal);
         if !renormalised {
             return 1.0 / (1.0 + 2.0 * rays[1].1);

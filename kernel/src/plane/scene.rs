@@ -342,6 +342,12 @@ impl<'m> PlaneScene<'m> {
         material.rays().map(|rays| (&material.lobe, rays))
     }
 
+    /// The lobe alone of a material that has one.
+    #[inline(always)]
+    pub(crate) fn lobe_alone(&self, material: u32) -> Option<&'m PlaneLobe> {
+        self.materials.get(material as usize).map(|material| &material.lobe)
+    }
+
     /// Whether any material has a lobe.
     pub fn is_glossy(&self) -> bool {
         self.bodies.iter().any(|body| self.lobe(body.material).is_some())

@@ -249,6 +249,7 @@ impl Chains<'_> {
 
 /// Nodes of the Gauss rule of exactly `n` points for n <= 3 and any `n` of [`rule`], else of panels of the 4-point rule or
 /// the next larger number of points.
+#[inline]
 pub(crate) fn points(n: usize) -> usize {
     match n {
         0..=1 => 1,
@@ -259,6 +260,7 @@ pub(crate) fn points(n: usize) -> usize {
 }
 
 /// One of the nodes of that rule on (0, 1), and its weight.
+#[inline]
 pub(crate) fn node(n: usize, number: usize) -> (f64, f64) {
     /// Half the distances of the 2- and 3-point rules' outer nodes.
     const OFF: [f64; 2] = [0.288_675_134_594_812_9, 0.387_298_334_620_741_7];
@@ -291,6 +293,7 @@ pub(crate) fn nodes(n: usize, mut f: impl FnMut(f64, f64)) {
 
 /// A node on (0, 1) of a rule whose nodes crowd at both ends, where what is integrated has square roots: silhouettes. One
 /// node is the middle. `sum` is that of [`graded_sum`].
+#[inline]
 pub(crate) fn graded_node(n: usize, number: usize, sum: f64) -> (f64, f64) {
     let (x, w) = node(n, number);
     if n < 3 { (x, w) } else { (x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * w / sum) }
