@@ -2141,7 +2141,7 @@ int32_t blik_get_report(const struct blik_solution *solution,
  * number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
  * of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
  * better, would take too much, or has had three rounds. This is what the program `render` and the Rust interface go by;
- * an estimate of up to one and a half times the error asked for passes.
+ * an estimate of up to one and three quarters of the error asked for passes.
  */
 int32_t blik_next_tolerance(const struct blik_report *report,
                             const struct blik_report *before,

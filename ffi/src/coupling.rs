@@ -24,6 +24,8 @@ pub struct blik_coupling {
     pub(crate) elements: Elements<'static>,
     pub(crate) blocks: &'static [Block<'static>],
     pub(crate) settings: Settings,
+    /// Rays of all rows.
+    pub(crate) rays: u64,
     /// Bytes of the caller's memory up to the last that is used; 0: none of it is the caller's.
     extent: usize,
     #[cfg(feature = "std")]
@@ -107,6 +109,7 @@ impl blik_coupling {
             elements,
             blocks,
             settings,
+            rays: Coupling::part(blocks).rays(),
             extent: 0,
             #[cfg(feature = "std")]
             owner: None,
@@ -615,12 +618,11 @@ impl blik_coupling {
             pairs: 0,
             skipped_rows: 0,
             open_rows: 0,
-            rays: 0,
+            rays: self.rays,
             dropped: 0.0,
             bytes: self.extent.max(matrix.memory() + self.elements.memory()),
         };
         for (_, row) in matrix.rows(0..matrix.unknowns()) {
-            info.rays += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
             info.pairs += row.targets.len() as u64;
             info.dropped = info.dropped.max(row.row.lost);
             info.skipped_rows += u64::from(row.row.state == ABSENT);

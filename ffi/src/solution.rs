@@ -101,7 +101,7 @@ impl blik_solution {
             variance: self.tables.variance,
             reference: self.tables.reference,
             brightest: self.tables.brightest,
-            settings: policy::chains(settings.tolerance, settings.max_bounces),
+            settings: policy::chains(settings.tolerance, settings.max_bounces, self.coupling.rays),
         }
     }
 }

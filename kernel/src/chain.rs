@@ -1,9 +1,12 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
 
+mod gather;
 mod outlook;
 mod sunlight;
 
+pub(crate) use gather::Gathered;
+use gather::Spot;
 pub(crate) use outlook::{Outlook, Way};
 
 use crate::arena::plain_table;
@@ -28,6 +31,33 @@ pub struct ChainSettings {
     pub max_bounces: Option<u32>,
     /// Share of the reference radiance that a sampled lobe or penumbra may be wrong by.
     pub tolerance: f64,
+    /// Where more than so many tolerances of error are expected of an element, rays from the point itself find what arrives
+    /// there.
+    pub gather: f64,
+    /// Rays that an image may take for that.
+    pub rays: u64,
+}
+
+/// Tolerances from which on rays go out from points: where few of an image's pixels may ask for them, and where all may.
+const GATHER: (f64, f64) = (3.0, 0.6);
+
+impl ChainSettings {
+    /// Settings for a tolerance; an image may take up to `rays` rays to mend what its elements are wrong by, beyond their
+    /// worst errors.
+    pub fn new(tolerance: f64, max_bounces: Option<u32>, rays: u64) -> ChainSettings {
+        ChainSettings { cutoff: 0.05 * tolerance, max_bounces, tolerance, gather: GATHER.0, rays }
+    }
+
+    /// The same for an image of so many pixels of facets that reflect `diffuse` at most.
+    pub(crate) fn of_image(self, pixels: usize, diffuse: f64) -> ChainSettings {
+        let rays = pixels as f64 * gather::usual_rays(self.tolerance / diffuse.max(f64::MIN_POSITIVE));
+        ChainSettings { gather: if rays <= self.rays as f64 { GATHER.1 } else { GATHER.0 }, ..self }
+    }
+
+    /// The same for sums over so many rays that errors of single elements count little.
+    pub(crate) fn of_sums(self) -> ChainSettings {
+        ChainSettings { gather: f64::INFINITY, ..self }
+    }
 }
 
 /// A solved scene: what the radiance along any ray follows from.
@@ -82,6 +112,8 @@ plain_table! {
         pub before: [f64; MAX_BANDS],
         /// What an image of the sun brings, and the product of the reflectances on the way to it.
         pub images: [[f64; MAX_BANDS]; 2],
+        /// What rays from a point bring.
+        pub gathered: Gathered,
     }
 }
 
@@ -93,6 +125,7 @@ impl Work {
         squares: [0.0; MAX_BANDS],
         before: [0.0; MAX_BANDS],
         images: [[0.0; MAX_BANDS]; 2],
+        gathered: Gathered::ZERO,
     };
 }
 
@@ -230,8 +263,12 @@ struct Leg<'w> {
     lobes: u32,
     /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
     lobe: bool,
+    /// True where the sun's disc does not count.
+    sunless: bool,
     /// For the sun's images.
     images: &'w mut [[f64; MAX_BANDS]; 2],
+    /// For rays from a point; none where it is such a ray itself.
+    gathered: Option<&'w mut Gathered>,
 }
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
@@ -339,9 +376,11 @@ impl Solved<'_> {
         outlook: &mut Outlook<'_>,
     ) -> Path {
         let mut path = Path::default();
-        let Work { through: [through, next], sums, squares, before, images } = work;
+        let Work { through: [through, next], sums, squares, before, images, gathered } = work;
         through.head_mut(self.shape.bands).fill(1.0);
-        let mut leg = Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, images };
+        let (sunless, gathered) = (false, Some(gathered));
+        let mut leg =
+            Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, sunless, images, gathered };
         let how = &mut How { sample, outlook, branches: true };
         if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
             let fan = Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
@@ -393,6 +432,7 @@ impl Solved<'_> {
                     let direction = surface.mirrored(self.scene, leg.ray.direction);
                     leg.ray = surface.leave(direction);
                     if leg.mirrors == 1
+                        && !leg.sunless
                         && how.outlook.is_parallel()
                         && !self.scene.is_smooth()
                         && let Some(known) =
@@ -508,7 +548,8 @@ impl Solved<'_> {
         let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
         let hit = self.bvh.closest(ray);
         let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
-        let mut leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, images };
+        let (sunless, gathered) = (leg.sunless, None);
+        let mut leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, sunless, images, gathered };
         self.follow(&mut leg, hit, &mut how, terms, path);
         for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
             let value = terms.sum(b) - before;
@@ -530,6 +571,7 @@ impl Solved<'_> {
         if let Some(sun) = &self.light.sun
             && !sun.is_point()
             && !leg.lobe
+            && !leg.sunless
             && sun.contains(leg.ray.direction)
         {
             let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(bands);
@@ -571,9 +613,26 @@ impl Solved<'_> {
             self.add_images(leg, surface, how, to, path);
         }
         let mut weight = 0.0;
+        for (through, rho) in leg.through.iter().zip(diffuse) {
+            weight = f64::max(weight, through * rho);
+        }
+        let mut variance = f64::from(self.variance.at(unknown));
+        let mut correction: &[f64] = &[];
+        if self.wants_rays(weight, variance)
+            && let Some(gathered) = leg.gathered.as_deref_mut()
+        {
+            let smooth = |band: usize| {
+                let linear = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
+                linear.max(0.0)
+            };
+            let spot = Spot { surface, unknown, smooth: &smooth, weight };
+            if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
+                (correction, variance) = (near, left);
+            }
+        }
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
             let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
-            let mut irradiance = smooth.max(0.0);
+            let mut irradiance = (smooth.max(0.0) + correction.at(band)).max(0.0);
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
@@ -581,8 +640,7 @@ impl Solved<'_> {
             }
             let share = through * rho;
             *to += share * FRAC_1_PI * irradiance;
-            weight = f64::max(weight, share);
         }
-        path.variance += weight * weight * f64::from(self.variance.at(unknown));
+        path.variance += weight * weight * variance;
     }
 }

@@ -64,6 +64,13 @@ plain_struct! {
     }
 }
 
+impl Row {
+    /// Rays traced in all.
+    pub fn all_rays(&self) -> u64 {
+        u64::from(self.rays) + u64::from(self.chain_rays)
+    }
+}
+
 /// State of a row that nothing needs: of a degenerate facet, or of one that reflects nothing diffusely.
 pub const ABSENT: u32 = 0;
 /// State of a row that sees nothing but the sky: nothing rises above its facet's plane.
@@ -397,6 +404,11 @@ impl<'m> Coupling<'m> {
     pub fn row(&self, unknown: usize) -> Row {
         let block = self.blocks.get(self.blocks.partition_point(|b| b.range().end <= unknown));
         block.and_then(|b| b.rows.get(unknown - b.range().start)).copied().unwrap_or_default()
+    }
+
+    /// Rays that its rows took.
+    pub fn rays(&self) -> u64 {
+        self.rows(0..self.unknowns).map(|(_, view)| view.row.all_rays()).sum()
     }
 
     /// Bytes in use.

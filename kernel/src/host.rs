@@ -93,6 +93,8 @@ pub struct Geometry<'s> {
     elements: Elements<'s>,
     blocks: Vec<Block<'s>>,
     settings: Settings,
+    /// Rays of the coupling.
+    rays: u64,
     report: Report,
 }
 
@@ -223,7 +225,8 @@ impl Host {
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
-        Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), report })
+        let rays = coupling.rays();
+        Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), rays, report })
     }
 
     /// Fills blocks with all `rows` rows, each of some `unmerged` records while it grows, in parallel.
@@ -382,7 +385,7 @@ impl Host {
         };
         let mut noting = Noting { slots: &mut suns.slots, thrown: &mut suns.thrown };
         beam::add(&beams, (&geometry.coupling()?, &geometry.elements), sun, shape, table, &mut noting);
-        Ok(beams.rows(0..rows).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum())
+        Ok(beams.rows(0..rows).map(|(_, r)| r.row.all_rays()).sum())
     }
 
     /// Solves for the diffuse radiance, the second time from the solution before; returns the irradiance table.
@@ -659,7 +662,7 @@ impl Lit<'_> {
             variance: &self.variance,
             reference: &self.reference,
             brightest: self.brightest,
-            settings: policy::chains(settings.tolerance, settings.max_bounces),
+            settings: policy::chains(settings.tolerance, settings.max_bounces, self.geometry.rays),
         }
     }
 

@@ -3,12 +3,12 @@
 mod lines;
 
 use crate::arena::{Arena, Need, plain_table};
-use crate::bvh::Ahead;
+use crate::bvh::{Ahead, Half};
 use crate::camera::{Camera, Sampling};
 use crate::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy, pieces};
-use crate::math::{clamp, floor, pow, sqrt};
+use crate::math::{Vec3, clamp, floor, pow, sqrt, unit};
 use crate::qmc::{Sequence, hash2};
 use crate::raster::{Items, NOTHING, Samples, UNSURE};
 use crate::ray::{Hit, Line, Ray};
@@ -124,8 +124,10 @@ const PART: f64 = 0.5;
 /// Largest error of one pixel, in tolerances.
 const LARGEST: f64 = 2.0;
 
-/// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line.
-const PARTS: usize = 4;
+/// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line: what
+/// reaches less far into a pixel than a part, and ends there, is missed. The finer ones are for tolerances below [`FINE`].
+const PARTS: (usize, usize) = (4, 8);
+const FINE: f64 = 1e-3;
 
 /// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
 /// are up to so many times the error wanted.
@@ -170,6 +172,8 @@ pub fn rows(
             return Err(Error::Length { what: "image component", expected, given: component.len() });
         }
     }
+    let settings = solved.settings.of_image(camera.columns() * camera.rows(), solved.scene.largest_diffuse());
+    let solved = &Solved { settings, ..*solved };
     let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
     let width = camera.columns() + 2;
     let stride = 3 * bands + NOTES;
@@ -288,6 +292,7 @@ impl<'a> Painter<'a, '_> {
         let ray = self.camera.ray(0.0, 0.0);
         self.primary.line = Line::new(&ray);
         let Board { terms, work, background, .. } = &mut *self.board;
+        work.gathered.forget();
         self.solved.radiance_with((&ray, None), Sample::Alone(0), terms, work, &mut self.outlook);
         *background = *terms;
     }
@@ -318,6 +323,7 @@ impl<'a> Painter<'a, '_> {
         for row in first..last {
             self.line(row + 1, -1..columns + 1, |this, own, path| this.keep(row + 1, own, path));
             let goal = self.goal(row, columns);
+            self.find_thin(row, columns);
             for j in 0..columns {
                 let at = self.slot(row, j);
                 let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(at + self.stride - NOTES + i));
@@ -354,6 +360,81 @@ impl<'a> Painter<'a, '_> {
         } else {
             LARGEST * tolerance
         }
+    }
+
+    /// Has pixels sampled that no centre about shows to hold anything but black backs, but into which the front of a facet
+    /// reaches: edges of sheets, wires.
+    fn find_thin(&mut self, row: isize, columns: isize) {
+        let empty = |this: &Self, j: isize| {
+            let at = this.slot(row, j);
+            this.is_dark(at) && this.is_flat(at)
+        };
+        let mut start = 0;
+        while start < columns {
+            let mut end = start;
+            while end < columns && empty(self, end) {
+                end += 1;
+            }
+            let mut left = start..end;
+            while !left.is_empty() {
+                let mut run = left.clone();
+                // halved until nothing is in it, or it is one pixel
+                while !run.is_empty() && self.reaches(row, &run) {
+                    if run.len() == 1 {
+                        let at = self.slot(row, run.start) + self.stride - 1;
+                        self.lines.set(at, f64::INFINITY);
+                        break;
+                    }
+                    run.end = run.start + run.len() as isize / 2;
+                }
+                left.start = run.end;
+            }
+            start = end + 1;
+        }
+    }
+
+    /// Whether fronts of facets may reach into a pixel whose centre shows none.
+    fn is_thin(&self, row: isize, column: isize) -> bool {
+        let end = self.slot(row, column) + self.stride;
+        let empty = self.is_dark(end - self.stride);
+        self.lines.at(end - 1) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
+    }
+
+    /// Whether a pixel's centre shows no facet, or a black back.
+    fn is_dark(&self, at: usize) -> bool {
+        let terms = self.lines.part(at..at + 3 * self.solved.shape.bands);
+        self.lines.at(at + self.stride - NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
+    }
+
+    /// Whether the front of a facet may reach into some pixels of a row.
+    fn reaches(&self, row: isize, columns: &Range<isize>) -> bool {
+        let (left, right) = (columns.start as f64, columns.end as f64);
+        let (top, bottom) = (row as f64, row as f64 + 1.0);
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        let eye = self.camera.ray(0.5 * (left + right), 0.5 * (top + bottom));
+        let inside = eye.origin + eye.direction;
+        let halves = [0, 1, 2, 3].map(|side| {
+            let [one, other] =
+                [corners.at(side), corners.at((side + 1) % 4)].map(|(x, y)| self.camera.ray(x, y));
+            let along = other.origin + other.direction - (one.origin + one.direction);
+            let normal = unit(one.direction.cross(along)).unwrap_or(Vec3::ZERO);
+            let height = normal.dot(one.origin);
+            if normal.dot(inside) >= height {
+                Half { normal, height }
+            } else {
+                Half { normal: -normal, height: -height }
+            }
+        });
+        let mut found = false;
+        let (bvh, two_sided) = (self.solved.bvh, self.solved.scene.sides() == 2);
+        bvh.within(&halves, |facet: u32| {
+            let front = |([a, ..], normal): ([Vec3; 3], Vec3)| {
+                normal.dot(if self.camera.is_parallel() { -eye.direction } else { eye.origin - a }) > 0.0
+            };
+            found = two_sided || bvh.corners(facet).is_some_and(front);
+            !found
+        });
+        found
     }
 
     /// Whether a pixel keeps its centre's value.
@@ -456,6 +537,7 @@ impl<'a> Painter<'a, '_> {
             Sampling::Area => Sample::Glance(seed),
         };
         let Board { terms, work, .. } = &mut *self.board;
+        work.gathered.forget();
         terms.clear(self.solved.shape.bands);
         let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.outlook);
         self.tally.chain += u64::from(path.rays);
@@ -514,9 +596,29 @@ impl<'a> Painter<'a, '_> {
         Measure { bands: self.solved.shape.bands, reference: self.solved.reference }
     }
 
+    /// Has the elements of a pixel that rays mend mended about its middle, rather than where lines or scattered rays first
+    /// meet them.
+    fn look_about(&mut self, row: isize, column: isize) {
+        self.board.work.gathered.forget();
+        for (x, y) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25)] {
+            let ray = self.camera.ray(column as f64 + x, row as f64 + y);
+            let hit = self.solved.bvh.closest(&ray);
+            let sample = Sample::Glance(hash2(row as u32, column as u32));
+            let Board { terms, work, .. } = &mut *self.board;
+            terms.clear(self.solved.shape.bands);
+            let path = self.solved.radiance_with((&ray, hit), sample, terms, work, &mut self.outlook);
+            self.tally.primary += 1;
+            self.tally.chain += u64::from(path.rays);
+            if work.gathered.is_empty() {
+                return;
+            }
+        }
+    }
+
     /// The mean over a pixel's square to about the error `goal`; returns the error expected.
     fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
         self.tally.refined += 1;
+        self.look_about(row, column);
         let mut sampled = false;
         let measure = self.measure();
         let (mut along, mut down) = (0.0, 0.0);
@@ -529,13 +631,18 @@ impl<'a> Painter<'a, '_> {
             along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
             down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
         }
-        let contrast = along.max(down);
+        let mut contrast = along.max(down);
+        if contrast <= COARSE * goal && self.is_thin(row, column) {
+            // scattered rays are few, and may all miss it
+            contrast = f64::INFINITY;
+        }
         if !sampled
             && contrast > COARSE * goal
             && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal)
         {
             return error;
         }
+        let contrast = if contrast.is_finite() { contrast } else { 1.0 };
         self.scatter(target, index, (row, column), contrast, goal)
     }
 
@@ -559,14 +666,14 @@ impl<'a> Painter<'a, '_> {
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
         let goal = 0.7 * goal;
+        let parts = if solved.settings.tolerance < FINE { PARTS.1 } else { PARTS.0 };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + SHIFT * y;
-            let shift = (shift - floor(shift) - 0.5) / PARTS as f64;
-            let mut places = [0.0; PARTS + 1];
-            places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / PARTS as f64 + shift);
-            (places[0], places[PARTS]) = (0.0, 1.0);
+            let shift = (shift - floor(shift) - 0.5) / parts as f64;
+            let mut places = [0.0; PARTS.1 + 1];
+            let places = evenly(&mut places, parts, shift);
             let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
-            integrate(&measure, &Fineness { places: &places, goal, narrowest }, inner, out, &mut |x, slot| {
+            integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
                 // a ray on the very edge may see what lies beyond it
                 let [x, y] = [x, y].map(|x| clamp(x, EDGE, 1.0 - EDGE));
                 let (x, y) = if along { (x, y) } else { (y, x) };
@@ -584,8 +691,8 @@ impl<'a> Painter<'a, '_> {
                 (!path.sampled).then_some(0.0)
             })
         };
-        let places = [0.0, 0.25, 0.5, 0.75, 1.0];
-        let fineness = Fineness { places: &places, goal, narrowest: NARROWEST.0 };
+        let mut places = [0.0; PARTS.1 + 1];
+        let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
         let out = self.work.part(2 * lines::memory(stride)..self.work.len());
         put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
@@ -654,6 +761,16 @@ impl<'a> Painter<'a, '_> {
         });
         error
     }
+}
+
+/// The ends of so many equal parts of the unit interval, those within it shifted.
+#[inline]
+fn evenly(places: &mut [f64; PARTS.1 + 1], parts: usize, shift: f64) -> &[f64] {
+    let places = places.head_mut(parts + 1);
+    places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / parts as f64 + shift);
+    places.set(0, 0.0);
+    places.set(parts, 1.0);
+    places
 }
 
 /// See [`Painter::slot`].

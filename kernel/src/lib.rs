@@ -20,7 +20,7 @@
 //! | coupling | [`coupling`] ([`mirror`], [`lobe`], [`qmc`]) | mesh, materials, tolerance | unknowns → rows of extended form factors |
 //! | light | [`light`] ([`sky`], [`sun`], [`beam`]) | light | coupling, sky, sun → irradiance before diffuse reflection |
 //! | radiosity | [`radiosity`] | light | coupling, irradiance → diffuse radiance and irradiance of all elements |
-//! | chain | [`chain`] | view | a ray → its radiance, the three terms of eq. (11) |
+//! | chain | [`chain`] | view | a ray → its radiance, the three terms of eq. (11); rays from a point where its element serves badly |
 //! | image | [`image`] ([`camera`], [`raster`]) | view | rays → pixels |
 //! | signature | [`signature`] ([`raster`]) | view | rays → radiant intensity, projected area, contrast |
 //! | plane model | [`plane`], all stages in two dimensions | | circles and polylines → image |

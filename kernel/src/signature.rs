@@ -162,6 +162,7 @@ fn each_row<'s>(
     let own = solved.bvh.is_own();
     let outlook = if own { Outlook::new(ways, true, view.cell_area, 1.0) } else { Outlook::none() };
     let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
+    let solved = &Solved { settings: solved.settings.of_sums(), ..*solved };
     let mut tracer = Tracer { solved, view, area, terms, work, outlook };
     let flat = view.cell_area == 0.0;
     let samples = !own || flat || solved.scene.facets() / FACETS > view.cells * view.cells;

@@ -6,10 +6,11 @@
 #![allow(dead_code)]
 
 use blik_kernel::Error;
+use blik_kernel::accuracy::{self, Own};
 use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput};
-use blik_kernel::chain::{ChainSettings, Solved};
+use blik_kernel::chain::Solved;
 use blik_kernel::coupling::rows::{self, RowSettings};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
@@ -75,6 +76,8 @@ pub struct Tables {
     direct: Vec<f64>,
     next: Vec<f64>,
     variance: Vec<f32>,
+    differences: Vec<Own>,
+    carried: [Vec<f32>; 2],
     /// Mean of cos V of the sun for each unknown.
     pub sun: Vec<f64>,
     /// Diffuse radiance of each unknown, each band.
@@ -118,8 +121,9 @@ impl Workspace {
             tables: Tables {
                 direct: vec![f64::NAN; 3 * bands * unknowns],
                 next: vec![f64::NAN; bands * unknowns],
-                // this part of the estimate is not compared
-                variance: vec![0.0; unknowns],
+                variance: vec![f32::NAN; unknowns],
+                differences: vec![[f32::NAN; 2]; bands * unknowns],
+                carried: [(); 2].map(|()| vec![f32::NAN; bands * unknowns]),
                 sun: vec![f64::NAN; unknowns],
                 radiance: vec![f64::NAN; bands * unknowns],
                 irradiance: vec![f64::NAN; 3 * bands * unknowns],
@@ -228,8 +232,8 @@ pub fn run(
         rows::fill(&scene, &bvh, &elements, &facing, &settings, range, memory)
     })?;
     let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
+    counts.visibility += coupling.rays();
     for (_, row) in coupling.rows(0..counts.unknowns) {
-        counts.visibility += u64::from(row.row.rays) + u64::from(row.row.chain_rays);
         counts.records += row.targets.len() + row.escapes.map(|b| b.packed.len()).sum::<usize>();
     }
 
@@ -311,7 +315,7 @@ impl Stage<'_> {
     fn solve(&self, tables: &mut Tables, counts: &mut Counts) -> Result<f64, Error> {
         let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
         let (rows, stride) = (unknowns * bands, self.shape.stride());
-        let Tables { direct, sun, radiance, next, irradiance, slots, thrown, images, .. } = tables;
+        let Tables { direct, sun, radiance, next, irradiance, slots, thrown, images, .. } = &mut *tables;
         let (direct, irradiance) = (&mut direct[..unknowns * stride], &mut irradiance[..unknowns * stride]);
         let system = self.system(direct, &sun[..unknowns]);
         split(parts, unknowns, bands, &mut radiance[..rows], |range, out| {
@@ -343,7 +347,29 @@ impl Stage<'_> {
         let side_of = |unknown| self.elements.facet_side(unknown);
         images.take_off(self.shape, self.elements.facet_sides(), side_of, irradiance);
         self.system(direct, &sun[..unknowns]).extend(irradiance);
-        Ok(policy::brightest(self.scene, self.light, self.reference, &radiance[..rows]))
+        let brightest = policy::brightest(self.scene, self.light, self.reference, &radiance[..rows]);
+        self.errors(tables, unknowns)?;
+        Ok(brightest)
+    }
+
+    /// The expected squared error of each unknown.
+    fn errors(&self, tables: &mut Tables, unknowns: usize) -> Result<(), Error> {
+        let (parts, bands, rows) = (self.plan.parts, self.shape.bands, unknowns * self.shape.bands);
+        let Tables { direct, sun, radiance, variance, differences, carried: [from, to], .. } = tables;
+        let system = self.system(&direct[..unknowns * self.shape.stride()], &sun[..unknowns]);
+        let own = &mut differences[..rows];
+        split(parts, unknowns, bands, own, |range, out| {
+            accuracy::differences(&system, &radiance[..rows], self.reference, range, out)
+        })?;
+        let (mut from, mut to) = (&mut from[..rows], &mut to[..rows]);
+        for number in 0..accuracy::carried(self.scene) {
+            let known = if number > 0 { &from[..] } else { &[] };
+            split(parts, unknowns, bands, to, |range, out| accuracy::carry(&system, own, known, range, out))?;
+            std::mem::swap(&mut from, &mut to);
+        }
+        split(parts, unknowns, 1, &mut variance[..unknowns], |range, out| {
+            accuracy::rows(&system, own, from, range, out)
+        })
     }
 
     fn system<'b>(&'b self, direct: &'b [f64], sun: &'b [f64]) -> System<'b> {
@@ -411,7 +437,7 @@ impl Stage<'_> {
             variance: &tables.variance[..counts.unknowns],
             reference: self.reference,
             brightest,
-            settings: ChainSettings { cutoff: 0.05 * tolerance, max_bounces: None, tolerance },
+            settings: policy::chains(tolerance, None, self.coupling.rays()),
         };
         let camera = Camera::new(camera, self.scene)?;
         let bytes = image::scratch_bytes(&camera, bands)?;

@@ -1,0 +1,100 @@
+//! Rays from a point find what arrives there where its element's linear function does not.
+
+#[path = "support/case.rs"]
+mod case;
+mod support;
+
+use blik_kernel::chain::{Sample, Solved, Terms};
+use blik_kernel::form_factor::point_to_polygon;
+use blik_kernel::math::Vec3;
+use blik_kernel::ray::Ray;
+use blik_kernel::sky::SkyModel;
+use case::{Case, SkyOf, SunOf, within};
+use glam::DVec3;
+use support::scenes::Mesh;
+use support::twin::Material;
+
+const RHO: f64 = 0.8;
+
+/// A floor from y = 0 on, and a wall over its edge.
+fn floor_and_wall(wall: Material) -> Case {
+    let mut mesh = Mesh::default();
+    mesh.rectangle(DVec3::new(-2.0, 0.0, 0.0), DVec3::X * 4.0, DVec3::Y * 4.0, 1, 0);
+    mesh.rectangle(DVec3::new(-2.0, 0.0, 0.0), DVec3::Z * 2.0, DVec3::X * 4.0, 1, 1);
+    Case::new(mesh, &[Material::spectral(&[RHO], &[0.0]), wall])
+}
+
+/// Places on the floor, down to a five-hundredth of its side from the wall.
+fn places() -> impl Iterator<Item = Vec3> {
+    let near = (0..24).map(|i| 0.008 * 1.2f64.powi(i));
+    near.zip([-0.7, 0.1, 0.9].into_iter().cycle()).map(|(y, x)| Vec3::new(x, y, 0.0))
+}
+
+/// Radiance of a place of the floor as seen from above.
+fn radiance(solved: &Solved<'_>, place: Vec3) -> f64 {
+    let from = solved.scene.to_scene(place + Vec3::new(0.0, 0.5, 1.0));
+    let direction = (solved.scene.to_scene(place) - from).normalize();
+    let mut terms = Terms::ZERO;
+    solved.radiance(&Ray::new(from, direction), Sample::Alone(1), &mut terms);
+    terms.sum(0)
+}
+
+/// With rays from each point, and with elements alone.
+fn both(solved: &Solved<'_>, place: Vec3) -> [f64; 2] {
+    [0.0, f64::INFINITY].map(|gather| {
+        let mut settings = solved.settings;
+        settings.gather = gather;
+        radiance(&Solved { settings, ..*solved }, place)
+    })
+}
+
+#[test]
+fn beside_a_black_wall_the_sky_is_what_the_wall_leaves() {
+    let tolerance = 1e-2;
+    let skies = [SkyOf::uniform(1), SkyOf::new(SkyModel::Hemisphere, &[1.0], &[0.0])];
+    for sky in skies {
+        let case = floor_and_wall(Material::spectral(&[0.0], &[0.0])).sky(sky);
+        case.with_lit(1, &within(tolerance), |_, lit| {
+            let solved = lit.solved();
+            let wall = [[-2.0, 0.0], [-2.0, 2.0], [2.0, 2.0], [2.0, 0.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+            let mut worst = [0.0f64; 2];
+            for place in places() {
+                let exact = RHO * (1.0 - point_to_polygon(place, Vec3::Z, &wall));
+                let errors = both(&solved, place).map(|l| (l - exact).abs());
+                worst = [worst[0].max(errors[0]), worst[1].max(errors[1])];
+            }
+            // rays go on until half the tolerance is expected; the worst of two dozen points may be twice as far off
+            assert!(worst[0] < tolerance, "{worst:?}");
+            assert!(worst[1] > 1.5 * worst[0], "elements alone would do here: {worst:?}");
+        });
+    }
+}
+
+#[test]
+fn the_sun_counts_once() {
+    // the wall is a mirror that shows the floor the sun, or glows by its light
+    for (wall, tolerance) in
+        [(Material::spectral(&[0.0], &[0.9]), 1e-2), (Material::spectral(&[0.1], &[0.0]), 2e-3)]
+    {
+        let mirror = wall.specular[0];
+        let sun = SunOf::new([0.2, 1.0, 1.5], &[3.0], 0.2665);
+        floor_and_wall(wall).sun(sun).with_lit(1, &within(tolerance), |_, lit| {
+            let solved = lit.solved();
+            let reference = lit.reference()[0];
+            for place in places().filter(|p| p.y > 0.05) {
+                let [rays, elements] = both(&solved, place).map(|l| l / reference);
+                let straight = RHO * (1.5 / 3.29f64.sqrt());
+                if mirror > 0.0 {
+                    // sunlight arrives straight and by way of the mirror, both computed at the point either way
+                    assert!((rays - elements).abs() < 1e-6, "{place}: {rays} {elements}");
+                } else {
+                    // what the lit wall sends down: half of the sunlight that it reflects at most, straight or by the floor
+                    let most = 0.5 * RHO * 0.1 * (1.0 / 3.29f64.sqrt() + 0.5 * straight);
+                    assert!(rays > straight && rays < straight + most, "{place}: {rays} {straight}");
+                    // the wall's light, to what both ways are wrong by
+                    assert!((rays - elements).abs() < 2.0 * tolerance, "{place}: {rays} {elements}");
+                }
+            }
+        });
+    }
+}
