@@ -211,7 +211,7 @@
 #define BLIK_ERROR_BUFFER_TOO_SMALL 5
 
 /**
- * An array has the wrong number of entries: `needed` and `given`.
+ * An array has the wrong number of entries, or a stride shorter than an entry: `needed` and `given`.
  */
 #define BLIK_ERROR_LENGTH 6
 
@@ -494,6 +494,41 @@
  * What a tally says of errors.
  */
 #define BLIK_FIELD_TALLY 32
+
+/**
+ * The mesh's vertices.
+ */
+#define BLIK_FIELD_VERTICES 33
+
+/**
+ * The mesh's facets.
+ */
+#define BLIK_FIELD_FACETS 34
+
+/**
+ * The materials of the mesh's facets.
+ */
+#define BLIK_FIELD_FACET_MATERIALS 35
+
+/**
+ * The mesh's normals.
+ */
+#define BLIK_FIELD_NORMALS 36
+
+/**
+ * The normals of the mesh's facets.
+ */
+#define BLIK_FIELD_FACET_NORMALS 37
+
+/**
+ * The mesh's materials.
+ */
+#define BLIK_FIELD_MATERIALS 38
+
+/**
+ * Tasks at once.
+ */
+#define BLIK_FIELD_LANES 39
 
 /**
  * Numbers of blik_array: 32-bit floating point.

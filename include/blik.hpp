@@ -545,6 +545,9 @@ struct image {
     blik_tally tally{};
 
     float at(std::size_t row, std::size_t column, std::size_t band = 0) const {
+        if (column >= columns || band >= bands) {
+            throw std::out_of_range("blik: a column or band outside the image");
+        }
         return pixels.at((row * columns + column) * bands + band);
     }
 };

@@ -135,13 +135,18 @@ pub unsafe extern "C" fn blik_load_size(
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
-        let block = unsafe { input(block.cast::<u8>(), size) }?;
+        let block = unsafe { input(there(block)?, size) }?;
         aligned(block)?;
         let size = load_bytes(Baked::count(block)?);
         // SAFETY: not null.
         unsafe { to.write(size) };
         Ok(())
     })
+}
+
+/// The block's bytes, not null even where there are none.
+fn there(block: *const c_void) -> Result<*const u8, blik_error> {
+    if block.is_null() { Err(blik_error::of(BLIK_ERROR_NULL)) } else { Ok(block.cast()) }
 }
 
 /// Checks the block in `block` from end to end and makes handles over it, in `memory`; the block itself is read where
@@ -165,7 +170,7 @@ pub unsafe extern "C" fn blik_load(
         let (to_scene, to_coupling, to_solution) = (needed(scene)?, needed(coupling)?, needed(solution)?);
         // SAFETY: by the caller's promise.
         let (block, memory): (&'static [u8], &'static mut [u8]) =
-            unsafe { (input(block.cast::<u8>(), size)?, bytes(memory, memory_size)?) };
+            unsafe { (input(there(block)?, size)?, bytes(memory, memory_size)?) };
         aligned(block)?;
         let parts = Baked::count(block)?;
         let (wanted, given) = (load_bytes(parts), memory.len());

@@ -134,20 +134,6 @@ impl Caller {
     }
 }
 
-impl Caller {
-    /// By the caller's function for any facets. Apart: its batches are no burden where the other one is asked.
-    #[inline(never)]
-    fn ask_any(&self, rays: &[Ray], hits: &mut [u32]) {
-        let Some(find) = self.tracer.any_facets else { return };
-        self.batches(rays, hits, |rays, hits| {
-            let mut found = [0; BATCH];
-            // SAFETY: the caller's function, with the caller's pointer; a batch is no longer than the array.
-            unsafe { find(self.tracer.user, rays.as_ptr(), rays.len(), found.as_mut_ptr()) };
-            hits.iter_mut().zip(found).for_each(|(hit, found)| *hit = u32::from(found));
-        });
-    }
-}
-
 impl Intersector for Caller {
     fn first(&self, rays: &[Ray], facets: &mut [u32]) {
         facets.fill(NO_FACET);
@@ -158,11 +144,14 @@ impl Intersector for Caller {
         });
     }
 
-    fn any(&self, rays: &[Ray], hits: &mut [u32]) {
-        if self.tracer.any_facets.is_some() {
-            return self.ask_any(rays, hits);
-        }
-        self.first(rays, hits);
-        hits.iter_mut().for_each(|hit| *hit = u32::from(*hit != NO_FACET));
+    fn any(&self, rays: &[Ray], hits: &mut [u32]) -> bool {
+        let Some(find) = self.tracer.any_facets else { return false };
+        self.batches(rays, hits, |rays, hits| {
+            let mut found = [0; BATCH];
+            // SAFETY: as above; a batch is no longer than the array.
+            unsafe { find(self.tracer.user, rays.as_ptr(), rays.len(), found.as_mut_ptr()) };
+            hits.iter_mut().zip(found).for_each(|(hit, found)| *hit = u32::from(found));
+        });
+        true
     }
 }

@@ -10,16 +10,17 @@ static ZEROS: [f64; MAX_BANDS] = [0.0; MAX_BANDS];
 /// A checked [`blik_mesh`]: no pointer is null where it is read, every stride holds its entries.
 pub(crate) struct Reader(blik_mesh);
 
-/// Checks an array of `numbers` numbers an entry in one of `formats`.
-fn check(array: &mut blik_array, numbers: usize, formats: &[i32]) -> Result<(), blik_error> {
+/// Checks an array, the field `field`, of `numbers` numbers an entry in one of `formats`.
+fn check(array: &mut blik_array, field: i32, numbers: usize, formats: &[i32]) -> Result<(), blik_error> {
     if array.count == 0 {
         return Ok(());
     }
+    let refused = |status| blik_error::of(status).field(field);
     if !formats.contains(&array.format) {
-        return Err(blik_error::of(BLIK_ERROR_CHOICE).at(0, 0, f64::from(array.format)));
+        return Err(refused(BLIK_ERROR_CHOICE).at(0, 0, f64::from(array.format)));
     }
     if array.data.is_null() {
-        return Err(blik_error::of(BLIK_ERROR_NULL));
+        return Err(refused(BLIK_ERROR_NULL));
     }
     let size = match array.format {
         BLIK_F64 | BLIK_U64 => 8,
@@ -31,11 +32,16 @@ fn check(array: &mut blik_array, numbers: usize, formats: &[i32]) -> Result<(), 
         array.stride = numbers * size;
     }
     if array.stride < numbers * size {
-        return Err(blik_error::of(BLIK_ERROR_LENGTH).sizes(numbers * size, array.stride));
+        return Err(refused(BLIK_ERROR_LENGTH).sizes(numbers * size, array.stride));
     }
-    match array.stride.checked_mul(array.count) {
+    fits(array.stride, array.count, field)
+}
+
+/// Refuses more entries than memory can hold.
+fn fits(stride: usize, count: usize, field: i32) -> Result<(), blik_error> {
+    match stride.checked_mul(count) {
         Some(bytes) if bytes <= isize::MAX as usize => Ok(()),
-        _ => Err(blik_error::of(BLIK_ERROR_TOO_MANY).sizes(isize::MAX as usize, array.count)),
+        _ => Err(blik_error::of(BLIK_ERROR_TOO_MANY).field(field).sizes(isize::MAX as usize, count)),
     }
 }
 
@@ -46,32 +52,26 @@ impl Reader {
         // SAFETY: by the caller's promise.
         let mut mesh = unsafe { read(mesh) }?;
         let reals = [BLIK_F64, BLIK_F32];
-        check(&mut mesh.vertices, 3, &reals)?;
+        check(&mut mesh.vertices, BLIK_FIELD_VERTICES, 3, &reals)?;
         let integers = [BLIK_U32, BLIK_U16, BLIK_U8, BLIK_U64];
-        check(&mut mesh.facets, 3, &integers)?;
-        check(&mut mesh.facet_materials, 1, &integers)?;
-        check(&mut mesh.normals, 3, &reals)?;
-        check(&mut mesh.facet_normals, 3, &[BLIK_U32, BLIK_U64])?;
+        check(&mut mesh.facets, BLIK_FIELD_FACETS, 3, &integers)?;
+        check(&mut mesh.facet_materials, BLIK_FIELD_FACET_MATERIALS, 1, &integers)?;
+        check(&mut mesh.normals, BLIK_FIELD_NORMALS, 3, &reals)?;
+        check(&mut mesh.facet_normals, BLIK_FIELD_FACET_NORMALS, 3, &[BLIK_U32, BLIK_U64])?;
+        let materials = |status| blik_error::of(status).field(BLIK_FIELD_MATERIALS);
         if mesh.material_count > 0 && mesh.materials.is_null() {
-            return Err(blik_error::of(BLIK_ERROR_NULL));
+            return Err(materials(BLIK_ERROR_NULL));
         }
-        if mesh.material_stride < size_of::<blik_material>() {
-            let error = blik_error::of(BLIK_ERROR_STRUCT_SIZE);
-            return Err(error.sizes(size_of::<blik_material>(), mesh.material_stride));
+        let size = size_of::<blik_material>();
+        if mesh.material_stride < size {
+            return Err(materials(BLIK_ERROR_STRUCT_SIZE).sizes(size, mesh.material_stride));
         }
-        match mesh.material_stride.checked_mul(mesh.material_count) {
-            Some(bytes) if bytes <= isize::MAX as usize => {}
-            _ => {
-                return Err(
-                    blik_error::of(BLIK_ERROR_TOO_MANY).sizes(isize::MAX as usize, mesh.material_count)
-                );
-            }
-        }
+        fits(mesh.material_stride, mesh.material_count, BLIK_FIELD_MATERIALS)?;
         let mesh = Reader(mesh);
         for index in 0..mesh.0.material_count {
             let material = mesh.raw(index);
             if ![material.diffuse, material.specular, material.emission].iter().all(|p| p.is_aligned()) {
-                return Err(blik_error { index, ..blik_error::of(BLIK_ERROR_ALIGNMENT) });
+                return Err(blik_error { index, ..materials(BLIK_ERROR_ALIGNMENT) });
             }
         }
         Ok(mesh)

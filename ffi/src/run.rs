@@ -119,7 +119,8 @@ impl Runner {
         // SAFETY: by the caller's promise.
         let run = if run.is_null() { DEFAULT } else { unsafe { read(run) }? };
         if !(1..=MOST_LANES).contains(&run.lanes) {
-            return Err(blik_error::of(BLIK_ERROR_TOO_MANY).sizes(MOST_LANES, run.lanes));
+            let error = blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_LANES);
+            return Err(error.sizes(MOST_LANES, run.lanes));
         }
         Ok(Runner { run, done: 0.0 })
     }

@@ -22,7 +22,7 @@ pub const BLIK_ERROR_HANDLE: i32 = 4;
 /// Memory is smaller than needed: `needed` and `given` are in bytes.
 pub const BLIK_ERROR_BUFFER_TOO_SMALL: i32 = 5;
 
-/// An array has the wrong number of entries: `needed` and `given`.
+/// An array has the wrong number of entries, or a stride shorter than an entry: `needed` and `given`.
 pub const BLIK_ERROR_LENGTH: i32 = 6;
 
 /// More of something than there may be; `needed` is the limit.
@@ -102,7 +102,7 @@ fn status_text(number: i32) -> &'static CStr {
         BLIK_ERROR_CHOICE => c"a number stands for no choice",
         BLIK_ERROR_HANDLE => c"a handle is not valid, or belongs to another scene",
         BLIK_ERROR_BUFFER_TOO_SMALL => c"memory is too small",
-        BLIK_ERROR_LENGTH => c"an array has the wrong number of entries",
+        BLIK_ERROR_LENGTH => c"an array has the wrong number of entries, or too short a stride",
         BLIK_ERROR_TOO_MANY => c"more of something than there may be",
         BLIK_ERROR_NO_FACETS => c"there are no facets",
         BLIK_ERROR_NO_MATERIALS => c"there are no materials",
@@ -229,6 +229,27 @@ pub const BLIK_FIELD_BODY_POINTS: i32 = 31;
 /// What a tally says of errors.
 pub const BLIK_FIELD_TALLY: i32 = 32;
 
+/// The mesh's vertices.
+pub const BLIK_FIELD_VERTICES: i32 = 33;
+
+/// The mesh's facets.
+pub const BLIK_FIELD_FACETS: i32 = 34;
+
+/// The materials of the mesh's facets.
+pub const BLIK_FIELD_FACET_MATERIALS: i32 = 35;
+
+/// The mesh's normals.
+pub const BLIK_FIELD_NORMALS: i32 = 36;
+
+/// The normals of the mesh's facets.
+pub const BLIK_FIELD_FACET_NORMALS: i32 = 37;
+
+/// The mesh's materials.
+pub const BLIK_FIELD_MATERIALS: i32 = 38;
+
+/// Tasks at once.
+pub const BLIK_FIELD_LANES: i32 = 39;
+
 fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
@@ -264,6 +285,13 @@ fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_BODY_RADIUS => c"body radius",
         BLIK_FIELD_BODY_POINTS => c"body points",
         BLIK_FIELD_TALLY => c"tally",
+        BLIK_FIELD_VERTICES => c"vertices",
+        BLIK_FIELD_FACETS => c"facets",
+        BLIK_FIELD_FACET_MATERIALS => c"facet_materials",
+        BLIK_FIELD_NORMALS => c"normals",
+        BLIK_FIELD_FACET_NORMALS => c"facet_normals",
+        BLIK_FIELD_MATERIALS => c"materials",
+        BLIK_FIELD_LANES => c"lanes",
         _ => c"",
     }
 }
@@ -314,7 +342,14 @@ impl From<Error> for blik_error {
             Error::BufferTooSmall { needed, given } => {
                 e::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, given)
             }
-            Error::Length { expected, given, .. } => e::of(BLIK_ERROR_LENGTH).sizes(expected, given),
+            Error::Length { what, expected, given } => {
+                let field = match what {
+                    "facet_materials" => BLIK_FIELD_FACET_MATERIALS,
+                    "facet_normals" => BLIK_FIELD_FACET_NORMALS,
+                    _ => BLIK_FIELD_NONE,
+                };
+                e::of(BLIK_ERROR_LENGTH).field(field).sizes(expected, given)
+            }
             Error::TooMany { limit, .. } => e::of(BLIK_ERROR_TOO_MANY).sizes(limit, 0),
             Error::NoFacets => e::of(BLIK_ERROR_NO_FACETS),
             Error::NoMaterials => e::of(BLIK_ERROR_NO_MATERIALS),

@@ -235,7 +235,7 @@ impl<'m> Bvh<'m> {
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
         match &self.external {
-            Some(external) => external.any(ray),
+            Some(external) => external.any(self, ray),
             None => traverse::occluded(self, ray),
         }
     }
@@ -252,7 +252,7 @@ impl<'m> Bvh<'m> {
     /// [`occluded`](Bvh::occluded) of each ray; as [`Bvh::closest_many`].
     pub fn occluded_many(&self, rays: &[Ray], occluded: &mut [bool]) {
         match &self.external {
-            Some(external) => external.any_many(rays, occluded),
+            Some(external) => external.any_many(self, rays, occluded),
             None => stream::occluded(self, rays, occluded),
         }
     }

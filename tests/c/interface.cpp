@@ -131,6 +131,11 @@ int main() {
         const std::size_t before = other.calls;
         traced.closest_hits(many, found);
         REQUIRE(found[99].t == 2.0 && other.calls - before <= 320 / batch);
+        // without a function for any facets: facets that rays do not meet are found out there, too
+        intersector.any_facets = nullptr;
+        traced.set_intersector(intersector);
+        const std::size_t shadows = other.shadows;
+        REQUIRE(blik::solution(own, sun).image(camera).pixels == alone.pixels && other.shadows == shadows);
     }
     REQUIRE(blik_scene_set_intersector(scene.get(), nullptr, nullptr) == BLIK_OK);
 

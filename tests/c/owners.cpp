@@ -162,6 +162,23 @@ int main() {
     REQUIRE(has(refused([&] { solution.image_rows(camera, 10, ~std::size_t{0} / 4); }), "rows"));
     blik_sky sky = blik::sky(99);
     REQUIRE(has(refused([&] { blik::solution none(coupling, blik::light(sky)); }), "value 99"));
+    blik_array array = blik::strided(vertices.data(), vertices.size() / 3, 8);
+    REQUIRE(has(refused([&] { blik::scene none(blik::mesh(array, facets).material({0.5})); }),
+                "stride: vertices, needed 12, given 8"));
+    array.data = nullptr;
+    array.stride = 0;
+    REQUIRE(has(refused([&] { blik::scene none(blik::mesh(array, facets).material({0.5})); }), "null: vertices"));
+    REQUIRE(has(refused([&] { blik::scene none(blik::mesh(vertices, vertices).material({0.5})); }), "facets, value"));
+    REQUIRE(has(refused([&] {
+                    blik::mesh mesh(vertices, facets);
+                    blik::scene none(mesh.facet_materials(std::vector<int>{0, 0}).material({0.5}));
+                }),
+                "facet_materials, needed 4, given 2"));
+    blik_run none = blik::alone();
+    none.lanes = 0;
+    REQUIRE(has(refused([&] { solution.image(camera, none); }), "lanes, needed 256, given 0"));
+    REQUIRE(has(refused([&] { blik::loaded nothing(blik::view<const unsigned char>{}); }), "null"));
+    REQUIRE(has(refused([&] { solution.image(camera).at(0, camera.columns); }), "outside the image"));
     std::puts("ok");
     return 0;
 }

@@ -20,8 +20,9 @@ pub const NO_FACET: u32 = u32::MAX;
 pub trait Intersector: Sync {
     /// Index of the first facet that each ray meets, but for its `skip` and beyond its `t_max`; [`NO_FACET`]: none.
     fn first(&self, rays: &[Ray], facets: &mut [u32]);
-    /// Whether each ray meets any: 1 or 0.
-    fn any(&self, rays: &[Ray], hits: &mut [u32]);
+    /// Whether each ray meets any: 1 or 0. False where it cannot tell sooner than [`Intersector::first`], which is then
+    /// asked instead.
+    fn any(&self, rays: &[Ray], hits: &mut [u32]) -> bool;
 }
 
 /// A tracer and the facets that its answers name.
@@ -47,11 +48,26 @@ impl External<'_> {
         self.hit(ray, facet[0])
     }
 
+    /// Whether rays, at most [`BATCH`], meet anything: 1 or 0, to `hits`. Where the tracer names facets, those that the ray
+    /// does not meet are left to `tree`.
+    #[inline(never)]
+    fn any_batch(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [u32]) {
+        if self.tracer.any(rays, hits) {
+            return;
+        }
+        hits.fill(NO_FACET);
+        self.tracer.first(rays, hits);
+        for (ray, hit) in rays.iter().zip(hits) {
+            let met = self.hit(ray, *hit).map_or_else(|()| traverse::occluded(tree, ray), |h| h.is_some());
+            *hit = u32::from(met);
+        }
+    }
+
     /// What the tracer says.
     #[inline(never)]
-    pub fn any(&self, ray: &Ray) -> bool {
+    pub fn any(&self, tree: &Bvh<'_>, ray: &Ray) -> bool {
         let mut hit = [0];
-        self.tracer.any(core::slice::from_ref(ray), &mut hit);
+        self.any_batch(tree, core::slice::from_ref(ray), &mut hit);
         hit[0] != 0
     }
 
@@ -71,12 +87,12 @@ impl External<'_> {
 
     /// What the tracer says of many rays.
     #[inline(never)]
-    pub fn any_many(&self, rays: &[Ray], occluded: &mut [bool]) {
+    pub fn any_many(&self, tree: &Bvh<'_>, rays: &[Ray], occluded: &mut [bool]) {
         let mut answers = [0; BATCH];
         for (rays, places) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
             let answers = answers.head_mut(rays.len());
             answers.fill(0);
-            self.tracer.any(rays, answers);
+            self.any_batch(tree, rays, answers);
             places.iter_mut().zip(&*answers).for_each(|(place, answer)| *place = *answer != 0);
         }
     }
@@ -152,6 +168,6 @@ impl Bvh<'_> {
     #[inline(always)]
     pub fn occluded_of(&self, ahead: &mut Ahead, number: u32, end: u32, ray: impl Fn(u32) -> Ray) -> bool {
         let Some(external) = &self.external else { return traverse::occluded(self, &ray(number)) };
-        ahead.answer(number, end, &ray, &|rays, hits| external.tracer.any(rays, hits)) != 0
+        ahead.answer(number, end, &ray, &|rays, hits| external.any_batch(self, rays, hits)) != 0
     }
 }
