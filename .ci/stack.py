@@ -39,7 +39,7 @@ RULES = [
         r"scatter)|signature::Tracer::sample|subdivide::Probe::shoot)::\{\{closure\}\}$|^blik::scene::blik_any_hits::",
     ),
     # an image's rows are integrals of integrals
-    (r"^blik_kernel::image::lines::integrate$", r"^blik_kernel::image::Painter::lines_across::"),
+    (r"^blik_kernel::image::lines::(integrate|put)$", r"^blik_kernel::image::Painter::lines_across::"),
     # skies of the plane model, the caller's among them
     (r"^<?blik_kernel::plane::", r"^blik::plane::solution::(asking|DARK)\b"),
     (r"^blik::plane::solution::asking::", ""),

@@ -383,8 +383,9 @@ impl Solved<'_> {
             Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, sunless, images, gathered };
         let how = &mut How { sample, outlook, branches: true };
         if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
-            let fan = Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
-            self.branch(&mut leg, &lobe, how, terms, &mut path, fan);
+            let mut fan =
+                Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
+            self.branch(&mut leg, &lobe, how, terms, &mut path, &mut fan);
         }
         path
     }
@@ -487,14 +488,14 @@ impl Solved<'_> {
     /// Equal-energy rays of the visible lobe: as many as its material asks for; or a first set by the tolerance and,
     /// where its rays disagree, a second.
     #[inline(never)]
-    fn branch(
+    fn branch<'w>(
         &self,
-        leg: &mut Leg<'_>,
+        leg: &mut Leg<'w>,
         hit: &Hit,
         how: &mut How<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-        mut fan: Fan<'_>,
+        fan: &mut Fan<'w>,
     ) {
         let Some(surface) = Surface::of_hit(self.scene, hit) else { return };
         let Some(lobe) = surface.mirror(self.scene).and_then(|mirror| mirror.lobe) else { return };
@@ -513,8 +514,7 @@ impl Solved<'_> {
             let turn = how.sample.turn(set);
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
-                let ray = surface.leave(direction);
-                self.add_ray(leg, &ray, how, &mut fan);
+                self.add_ray(leg, surface.leave(direction), how, fan);
             }
             if asked.is_none() {
                 goal = self.all_rays(fan.spread(self.reference));
@@ -537,25 +537,27 @@ impl Solved<'_> {
         wanted.min(MOST_LOBE_RAYS) as u32
     }
 
-    /// One more ray of the lobe that `leg` has met, to its end.
-    fn add_ray(&self, leg: &mut Leg<'_>, ray: &Ray, how: &mut How<'_, '_>, fan: &mut Fan<'_>) {
+    /// One more ray of the lobe that `leg` has met, to its end. The leg is lent to the ray, as it is all that the stack has
+    /// room for, and given back but for its own ray.
+    fn add_ray<'w>(&self, leg: &mut Leg<'w>, ray: Ray, how: &mut How<'_, '_>, fan: &mut Fan<'w>) {
         let bands = self.shape.bands;
-        let Fan { terms, path, squares, before, through, count } = fan;
-        before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = terms.sum(b));
-        copy(through.head_mut(bands), leg.through.head(bands));
-        path.rays += 1;
-        let sample = Sample::OneOf { seed: how.sample.seed(), index: *count };
+        fan.before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = fan.terms.sum(b));
+        copy(fan.through.head_mut(bands), leg.through.head(bands));
+        fan.path.rays += 1;
+        let sample = Sample::OneOf { seed: how.sample.seed(), index: fan.count };
         let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
-        let hit = self.bvh.closest(ray);
-        let (mirrors, lobes, images) = (leg.mirrors, leg.lobes, &mut *leg.images);
-        let (sunless, gathered) = (leg.sunless, None);
-        let mut leg = Leg { ray: *ray, through, mirrors, lobes, lobe: true, sunless, images, gathered };
-        self.follow(&mut leg, hit, &mut how, terms, path);
-        for (b, (square, before)) in squares.iter_mut().zip(before.iter()).enumerate().take(bands) {
-            let value = terms.sum(b) - before;
+        let hit = self.bvh.closest(&ray);
+        let (mirrors, lobes, gathered) = (leg.mirrors, leg.lobes, leg.gathered.take());
+        (leg.ray, leg.lobe) = (ray, true);
+        core::mem::swap(&mut leg.through, &mut fan.through);
+        self.follow(leg, hit, &mut how, fan.terms, &mut fan.path);
+        core::mem::swap(&mut leg.through, &mut fan.through);
+        (leg.mirrors, leg.lobes, leg.gathered) = (mirrors, lobes, gathered);
+        for (b, (square, before)) in fan.squares.iter_mut().zip(fan.before.iter()).enumerate().take(bands) {
+            let value = fan.terms.sum(b) - before;
             *square += value * value;
         }
-        *count += 1;
+        fan.count += 1;
     }
 
     /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.

@@ -10,7 +10,7 @@ use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy, pieces};
 use crate::math::{Vec3, clamp, floor, pow, sqrt, unit};
 use crate::qmc::{Sequence, hash2};
-use crate::raster::{Items, NOTHING, Samples, UNSURE};
+use crate::raster::{Items, NOTHING, UNSURE};
 use crate::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use core::ops::Range;
@@ -194,7 +194,6 @@ pub fn rows(
         board,
         beside: false,
         primary: Primary {
-            samples: camera.samples(),
             items,
             draws,
             drawn: 0..0,
@@ -241,7 +240,6 @@ plain_table! {
 
 /// What rays through pixel centres meet.
 struct Primary<'m> {
-    samples: Samples,
     items: Items<'m>,
     /// Whether facets are drawn, rather than rays traced.
     draws: bool,
@@ -255,10 +253,10 @@ struct Primary<'m> {
 
 impl Primary<'_> {
     /// Makes the item buffer hold a row.
-    fn draw(&mut self, solved: &Solved<'_>, row: isize) {
+    fn draw(&mut self, solved: &Solved<'_>, camera: &Camera, row: isize) {
         if self.draws && !self.drawn.contains(&row) {
             self.drawn = row..self.last.min(row + DRAWN as isize).max(row + 1);
-            self.items.draw(solved.bvh, &self.samples, self.drawn.clone(), -1);
+            self.items.draw(solved.bvh, &camera.samples(), self.drawn.clone(), -1);
         }
     }
 
@@ -364,6 +362,7 @@ impl<'a> Painter<'a, '_> {
 
     /// Has pixels sampled that no centre about shows to hold anything but black backs, but into which the front of a facet
     /// reaches: edges of sheets, wires.
+    #[inline(never)]
     fn find_thin(&mut self, row: isize, columns: isize) {
         let empty = |this: &Self, j: isize| {
             let at = this.slot(row, j);
@@ -407,6 +406,7 @@ impl<'a> Painter<'a, '_> {
     }
 
     /// Whether the front of a facet may reach into some pixels of a row.
+    #[inline(never)]
     fn reaches(&self, row: isize, columns: &Range<isize>) -> bool {
         let (left, right) = (columns.start as f64, columns.end as f64);
         let (top, bottom) = (row as f64, row as f64 + 1.0);
@@ -466,7 +466,7 @@ impl<'a> Painter<'a, '_> {
         columns: Range<isize>,
         mut each: impl FnMut(&mut Self, Range<isize>, &Path),
     ) {
-        self.primary.draw(self.solved, row);
+        self.primary.draw(self.solved, self.camera, row);
         self.tally.primary += columns.len() as u64;
         let mut ahead = Ahead::default();
         let skips = self.primary.draws && self.camera.is_parallel();
@@ -598,6 +598,7 @@ impl<'a> Painter<'a, '_> {
 
     /// Has the elements of a pixel that rays mend mended about its middle, rather than where lines or scattered rays first
     /// meet them.
+    #[inline(never)]
     fn look_about(&mut self, row: isize, column: isize) {
         self.board.work.gathered.forget();
         for (x, y) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25)] {

@@ -118,12 +118,14 @@ impl Solved<'_> {
     }
 
     /// Rays toward the sun's disc to begin with.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
         let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.tolerance);
         (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
 
     /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn sun_at_stake(&self, leg: &Leg<'_>, surface: &Surface, sun: &Sun<'_>) -> f64 {
         let diffuse = self.scene.diffuse(surface.material);
         let mut largest: f64 = 0.0;
@@ -155,11 +157,7 @@ impl Solved<'_> {
                 continue;
             }
             let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
-            let shown = |&facet: &u32| {
-                let corners = self.scene.corners().at(facet as usize);
-                may_meet(&corners, surface.point, axis, sun.half_angle())
-            };
-            if known.is_some_and(|mirrors| !mirrors.iter().any(shown)) {
+            if known.is_some_and(|mirrors| !self.any_may_show(mirrors, surface.point, axis, sun)) {
                 continue;
             }
             let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
@@ -173,12 +171,32 @@ impl Solved<'_> {
                 seen
             });
             if all > 0.0 {
-                let diffuse = self.scene.diffuse(surface.material);
-                for (band, (to, (lit, rho))) in to.iter_mut().zip(lit.iter().zip(diffuse)).enumerate() {
-                    let irradiance = sun.irradiance(band) * cosine * (lit / all);
-                    *to += leg.through.at(band) * rho * FRAC_1_PI * irradiance;
-                }
+                self.add_lit(leg, surface, (sun, cosine, all), to);
             }
+        }
+    }
+
+    /// Whether any of these mirrors may show a point the sun whose middle seems to stand in the direction `axis`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn any_may_show(&self, mirrors: &[u32], point: Vec3, axis: Vec3, sun: &Sun<'_>) -> bool {
+        mirrors
+            .iter()
+            .any(|&facet| may_meet(&self.scene.corners().at(facet as usize), point, axis, sun.half_angle()))
+    }
+
+    /// Adds what an image of the sun brings, of whose disc `leg.images` holds the lit share of `all`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn add_lit(
+        &self,
+        leg: &Leg<'_>,
+        surface: &Surface,
+        (sun, cosine, all): (&Sun<'_>, f64, f64),
+        to: &mut [f64; MAX_BANDS],
+    ) {
+        let diffuse = self.scene.diffuse(surface.material);
+        for (band, (to, (lit, rho))) in to.iter_mut().zip(leg.images[0].iter().zip(diffuse)).enumerate() {
+            let irradiance = sun.irradiance(band) * cosine * (lit / all);
+            *to += leg.through.at(band) * rho * FRAC_1_PI * irradiance;
         }
     }
 

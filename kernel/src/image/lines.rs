@@ -53,11 +53,13 @@ impl Measure<'_> {
     }
 
     /// How far two vectors are apart.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     pub(super) fn step(&self, a: &[f64], b: &[f64]) -> f64 {
         self.largest(|band| self.sum(a, band) - self.sum(b, band))
     }
 
     /// How far `m` is from the mean of `a` and `b`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     pub(super) fn bend(&self, a: &[f64], m: &[f64], b: &[f64]) -> f64 {
         self.largest(|band| self.sum(m, band) - 0.5 * (self.sum(a, band) + self.sum(b, band)))
     }
@@ -89,11 +91,8 @@ pub(super) fn integrate(
 ) -> Option<f64> {
     let stride = measure.stride();
     let size = stride + NOTES;
-    let mut put = |memory: &mut [f64], slot: usize, x: f64| -> Option<()> {
-        let node = memory.part_mut(slot * size..(slot + 1) * size);
-        let square = value(x, node.head_mut(stride))?;
-        copy(node.part_mut(stride..size), &[x, square, -1.0]);
-        Some(())
+    let mut put = |memory: &mut [f64], slot: usize, x: f64| {
+        put(memory.part_mut(slot * size..(slot + 1) * size), stride, x, value)
     };
     let node = |memory: &[f64], slot: usize| {
         let at = slot * size + stride;
@@ -111,7 +110,7 @@ pub(super) fn integrate(
             let (left, right) = (memory.part(0..stride), memory.part(top * size..top * size + stride));
             let error = if known >= 0.0 { known } else { JUMP * width * measure.step(left, right) };
             if known >= 0.0 || error <= fineness.goal || width <= fineness.narrowest || top + 1 >= SLOTS {
-                out.iter_mut().zip(left).zip(right).for_each(|((o, l), r)| *o += 0.5 * width * (l + r));
+                add(out, left, right, 0.5 * width);
                 error2 += error * error + 0.5 * width * width * (left2 + right2);
                 let (first, rest) = memory.split_at_mut_checked(size)?;
                 copy(first, rest.part((top - 1) * size..top * size));
@@ -129,6 +128,25 @@ pub(super) fn integrate(
         }
     }
     Some(error2)
+}
+
+/// Fills in the values at a place and its notes.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+fn put(
+    node: &mut [f64],
+    stride: usize,
+    x: f64,
+    value: &mut dyn FnMut(f64, &mut [f64]) -> Option<f64>,
+) -> Option<()> {
+    let square = value(x, node.head_mut(stride))?;
+    copy(node.part_mut(stride..stride + NOTES), &[x, square, -1.0]);
+    Some(())
+}
+
+/// Adds `weight` times the sums of two vectors.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+fn add(out: &mut [f64], left: &[f64], right: &[f64], weight: f64) {
+    out.iter_mut().zip(left).zip(right).for_each(|((o, l), r)| *o += weight * (l + r));
 }
 
 #[cfg(test)]
