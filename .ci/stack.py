@@ -89,7 +89,7 @@ def taken_from_stack(name, arguments, copies):
         return max(0, (1 << amounts[1]) - 8)
     elif target == "sp" and is_sum and amounts:
         return amounts[-1] if name.startswith("sub") else 0
-    elif target == "sp" and not re.match(r"v?(st|ld)m", name) and (name, parts[1]) not in [("mov", copy) for copy in copies]:
+    elif target == "sp" and not re.match(r"v?(st|ld)m", name) and not (name == "mov" and parts[1] in copies):
         sys.exit(f"not understood: {name} {arguments}")
     return 0
 

@@ -620,7 +620,7 @@ impl Solved<'_> {
         }
         let mut variance = f64::from(self.variance.at(unknown));
         let mut correction: &[f64] = &[];
-        if self.wants_rays(weight, variance)
+        if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {
             let smooth = |band: usize| {

@@ -134,10 +134,16 @@ impl<'a> SunImages<'a> {
         own.iter().take_while(|p| **p != 0 && **p != MANY).map(|p| unpack(*p))
     }
 
+    /// Whether [`SunImages::of`] gives all images that one of `sides` sides of facets may see; else their light stays a mean.
+    #[inline]
+    pub fn are_known(&self, sides: usize, side: usize) -> bool {
+        self.slots.is_empty() || self.slots.at(side * slots(sides)) != MANY
+    }
+
     /// Whether one of `sides` sides of facets may see an image in the direction `axis`: where its images are known, one of
     /// them stands there.
     pub fn may_show(&self, sides: usize, side: usize, axis: Vec3) -> bool {
-        if self.slots.is_empty() || self.slots.at(side * slots(sides)) == MANY {
+        if self.slots.is_empty() || !self.are_known(sides, side) {
             return true;
         }
         self.of(sides, side).any(|own| 1.0 - own.dot(axis) < SEEN)
@@ -151,7 +157,7 @@ impl<'a> SunImages<'a> {
         (sides, side): (usize, usize),
         (unknown, level): (usize, usize),
     ) -> &'a [f64] {
-        if self.slots.is_empty() || self.slots.at(side * slots(sides)) == MANY {
+        if self.slots.is_empty() || !self.are_known(sides, side) {
             return &[];
         }
         let start = (unknown * shape.levels + level) * shape.bands;
@@ -193,6 +199,7 @@ mod tests {
         let shape = Shape { levels: 1, bands: 1 };
         let images = SunImages::new(&slots, &thrown, sides, sides, shape).unwrap();
         assert_eq!([0, 1, 2].map(|side| images.of(sides, side).count()), [0, 3, 0]);
+        assert_eq!([0, 1, 2].map(|side| images.are_known(sides, side)), [true, true, false]);
         let mut table = [3.0; 3 * ROOM / SLOTS.0];
         images.take_off(shape, sides, |unknown| unknown, &mut table);
         assert_eq!([table[3], table[4], table[6]], [2.0, 3.0, 3.0]);

@@ -153,14 +153,20 @@ pub(super) struct Spot<'a> {
 
 impl Solved<'_> {
     /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
-    /// holds: not what lobes and curved mirrors throw of the sun, nor what is reflected a limited number of times.
+    /// holds: not what lobes and curved mirrors throw of the sun, nor flat ones where there are too many, nor what is
+    /// reflected a limited number of times.
     #[inline]
-    pub(super) fn wants_rays(&self, weight: f64, variance: f64) -> bool {
+    pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
         let most = self.settings.gather * self.settings.tolerance;
         GATHERS
             && weight * weight * variance > most * most
             && self.shape.levels == 1
-            && (self.light.sun.is_none() || self.mirrors_are_flat())
+            && (self.light.sun.is_none() || self.mirrors_are_flat() && self.knows_images(surface))
+    }
+
+    fn knows_images(&self, surface: &Surface) -> bool {
+        let side = surface.facet * self.scene.sides() + surface.side;
+        self.images.are_known(self.elements.facet_sides(), side)
     }
 
     fn mirrors_are_flat(&self) -> bool {
