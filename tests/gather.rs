@@ -4,8 +4,11 @@
 mod case;
 mod support;
 
+use blik_kernel::arena::Memory;
+use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::chain::{Sample, Solved, Terms};
 use blik_kernel::form_factor::point_to_polygon;
+use blik_kernel::image::{Target, rows, scratch_bytes};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::sky::SkyModel;
@@ -68,6 +71,29 @@ fn beside_a_black_wall_the_sky_is_what_the_wall_leaves() {
             assert!(worst[1] > 1.5 * worst[0], "elements alone would do here: {worst:?}");
         });
     }
+}
+
+/// A block of a solved scene may be forged: its irradiances are within what is accepted, and beyond what is solved.
+#[test]
+fn pixels_are_finite_whatever_the_irradiances_are() {
+    let case = floor_and_wall(Material::spectral(&[RHO], &[0.2])).sky(SkyOf::uniform(1));
+    case.with_lit(1, &within(1e-2), |_, lit| {
+        let mut solved = lit.solved();
+        let (huge, unsure) = (vec![1e40; solved.irradiance.len()], vec![1.0; solved.variance.len()]);
+        (solved.irradiance, solved.variance) = (&huge, &unsure);
+        let input = case::perspective([0.5, 3.0, 2.0], [0.0, 0.5, 0.0], 40.0, 8);
+        for (sampling, rays) in
+            [(Sampling::Centre, u64::MAX), (Sampling::Area, u64::MAX), (Sampling::Area, 0)]
+        {
+            solved.settings.rays = rays;
+            let camera = Camera::new(&CameraInput { sampling, ..input }, solved.scene).unwrap();
+            let (mut pixels, mut memory) =
+                (vec![f32::NAN; 64], Memory::new(scratch_bytes(&camera, 1).unwrap()));
+            let mut target = Target { image: &mut pixels, components: [&mut [], &mut [], &mut []] };
+            rows(&solved, &camera, 0..8, &mut target, memory.bytes_mut()).unwrap();
+            assert!(pixels.iter().all(|p| p.is_finite()) && pixels.contains(&f32::MAX), "{pixels:?}");
+        }
+    });
 }
 
 #[test]

@@ -12,7 +12,7 @@
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::error::Error;
 use crate::index::{Index, IndexMut, pieces, span};
-use crate::math::clamp;
+use crate::math::narrow;
 use crate::radiosity::System;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::simd::{self, Isa, LaneTask, Lanes};
@@ -163,11 +163,6 @@ pub fn rows(
 
 fn check(given: usize, expected: usize) -> Result<(), Error> {
     if given == expected { Ok(()) } else { Err(Error::Length { what: "errors", expected, given }) }
-}
-
-/// In f32, at most its largest.
-fn narrow(x: f64) -> f32 {
-    clamp(x, f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
 /// Adds a row's checks, each times the light it stands for, by band.

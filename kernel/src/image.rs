@@ -8,7 +8,7 @@ use crate::camera::{Camera, Sampling};
 use crate::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy, pieces};
-use crate::math::{Vec3, clamp, floor, pow, sqrt, unit};
+use crate::math::{Vec3, clamp, floor, narrow, pow, sqrt, unit};
 use crate::qmc::{Sequence, hash2};
 use crate::raster::{Items, NOTHING, UNSURE};
 use crate::ray::{Hit, Line, Ray};
@@ -800,9 +800,9 @@ fn put(
     };
     for band in 0..bands {
         let terms = [0, 1, 2].map(|term| of(term, band));
-        fill(target.image, band, ((terms[0] + terms[1] + terms[2]) * share) as f32);
+        fill(target.image, band, narrow((terms[0] + terms[1] + terms[2]) * share));
         for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
-            fill(component, band, (term * share) as f32);
+            fill(component, band, narrow(term * share));
         }
     }
 }

@@ -54,6 +54,12 @@ pub fn clamp(x: f64, low: f64, high: f64) -> f64 {
     }
 }
 
+/// `x` in f32, at most its largest: what the kernel makes is far below, but a forged block may hold anything.
+#[inline]
+pub fn narrow(x: f64) -> f32 {
+    clamp(x, f64::from(f32::MIN), f64::from(f32::MAX)) as f32
+}
+
 /// Neumaier's compensated sum: error of a few ulp of the result plus `n eps^2` of the terms' absolute sum.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sum {
