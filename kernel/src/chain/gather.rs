@@ -34,6 +34,10 @@ const PARTS: usize = 8;
 /// Error to reach, in tolerances.
 const GOAL: f64 = 0.5;
 
+/// Square of the error of the mean of all rays over what their parts' differences tell: what is small and bright, or dark,
+/// few of them see.
+const DOUBT: f64 = 3.0;
+
 /// Square of the error that what rays meet leaves in their mean, over the square of the mean of its expected errors: near
 /// elements err together.
 const ALIKE: f64 = 2.0;
@@ -302,6 +306,6 @@ impl Solved<'_> {
             }
         }
         let carried = gathered.carried / f64::from(rays);
-        gathered.error(self.reference, rays, exact) + ALIKE * carried * carried
+        DOUBT * gathered.error(self.reference, rays, exact) + ALIKE * carried * carried
     }
 }
