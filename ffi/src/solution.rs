@@ -539,9 +539,8 @@ impl Shine<'_> {
                 let done = block[0].range().len();
                 let thrown = Coupling::part(&block);
                 beam::add(&thrown, (self.matrix, elements), sun, self.shape, direct, images);
-                let rays = |r: &blik_kernel::coupling::Row| u64::from(r.rays) + u64::from(r.chain_rays);
-                traced +=
-                    thrown.rows(wanted.start..wanted.start + done).map(|(_, r)| rays(&r.row)).sum::<u64>();
+                let thrown = thrown.rows(wanted.start..wanted.start + done);
+                traced += thrown.map(|(_, r)| r.row.all_rays()).sum::<u64>();
                 next += done;
             }
             if next == before {

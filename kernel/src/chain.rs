@@ -5,13 +5,12 @@ mod gather;
 mod outlook;
 mod sunlight;
 
-pub(crate) use gather::Gathered;
-use gather::Spot;
+use gather::{Gathered, Spot};
 pub(crate) use outlook::{Outlook, Way};
 
 use crate::arena::plain_table;
 use crate::bvh::Bvh;
-use crate::element::Elements;
+use crate::element::{Elements, Local};
 use crate::index::{Index, IndexMut, copy};
 use crate::light::{Light, Shape};
 use crate::math::{FRAC_1_PI, floor, pow, sqrt};
@@ -31,6 +30,8 @@ pub struct ChainSettings {
     pub max_bounces: Option<u32>,
     /// Share of the reference radiance that a sampled lobe or penumbra may be wrong by.
     pub tolerance: f64,
+    /// Relative error of the sky's irradiance on a plane.
+    pub sky_error: f64,
     /// Where more than so many tolerances of error are expected of an element, rays from the point itself find what arrives
     /// there.
     pub gather: f64,
@@ -38,20 +39,15 @@ pub struct ChainSettings {
     pub rays: u64,
 }
 
-/// Tolerances from which on rays go out from points: where few of an image's pixels may ask for them, and where all may.
-const GATHER: (f64, f64) = (3.0, 0.6);
+/// [`ChainSettings::gather`] where all pixels of an image may take rays.
+const GATHER_ALL: f64 = 0.6;
 
 impl ChainSettings {
-    /// Settings for a tolerance; an image may take up to `rays` rays to mend what its elements are wrong by, beyond their
-    /// worst errors.
-    pub fn new(tolerance: f64, max_bounces: Option<u32>, rays: u64) -> ChainSettings {
-        ChainSettings { cutoff: 0.05 * tolerance, max_bounces, tolerance, gather: GATHER.0, rays }
-    }
-
-    /// The same for an image of so many pixels of facets that reflect `diffuse` at most.
+    /// The same for an image of so many pixels of facets that reflect `diffuse` at most: where the rays suffice for all of
+    /// them, all but the best elements are mended.
     pub(crate) fn of_image(self, pixels: usize, diffuse: f64) -> ChainSettings {
         let rays = pixels as f64 * gather::usual_rays(self.tolerance / diffuse.max(f64::MIN_POSITIVE));
-        ChainSettings { gather: if rays <= self.rays as f64 { GATHER.1 } else { GATHER.0 }, ..self }
+        ChainSettings { gather: if rays <= self.rays as f64 { GATHER_ALL } else { self.gather }, ..self }
     }
 
     /// The same for sums over so many rays that errors of single elements count little.
@@ -607,7 +603,7 @@ impl Solved<'_> {
         if diffuse.iter().all(|&d| d == 0.0) {
             return;
         }
-        let (unknown, (a, b)) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
+        let (unknown, local) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
         let sunlit = self.sun_cosine(leg, surface, how, path);
@@ -623,18 +619,13 @@ impl Solved<'_> {
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {
-            let smooth = |band: usize| {
-                let linear = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
-                linear.max(0.0)
-            };
-            let spot = Spot { surface, unknown, smooth: &smooth, weight };
+            let spot = Spot { surface, unknown, values, local, weight };
             if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
                 (correction, variance) = (near, left);
             }
         }
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
-            let smooth = values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band);
-            let mut irradiance = (smooth.max(0.0) + correction.at(band)).max(0.0);
+            let mut irradiance = (linear(values, bands, local, band) + correction.at(band)).max(0.0);
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
@@ -645,4 +636,10 @@ impl Solved<'_> {
         }
         path.variance += weight * weight * variance;
     }
+}
+
+/// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates.
+#[inline(always)]
+fn linear(values: &[f64], bands: usize, (a, b): Local, band: usize) -> f64 {
+    (values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band)).max(0.0)
 }

@@ -221,11 +221,12 @@ impl Host {
         })?;
         let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
+        let rays = coupling.rays();
+        report.rays.visibility += rays;
         report.count_rows(&coupling);
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
-        let rays = coupling.rays();
         Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), rays, report })
     }
 

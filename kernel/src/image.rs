@@ -1,14 +1,15 @@
 //! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
 
 mod lines;
+mod thin;
 
 use crate::arena::{Arena, Need, plain_table};
-use crate::bvh::{Ahead, Half};
+use crate::bvh::Ahead;
 use crate::camera::{Camera, Sampling};
 use crate::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy, pieces};
-use crate::math::{Vec3, clamp, floor, narrow, pow, sqrt, unit};
+use crate::math::{clamp, floor, narrow, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
 use crate::raster::{Items, NOTHING, UNSURE};
 use crate::ray::{Hit, Line, Ray};
@@ -360,83 +361,6 @@ impl<'a> Painter<'a, '_> {
         }
     }
 
-    /// Has pixels sampled that no centre about shows to hold anything but black backs, but into which the front of a facet
-    /// reaches: edges of sheets, wires.
-    #[inline(never)]
-    fn find_thin(&mut self, row: isize, columns: isize) {
-        let empty = |this: &Self, j: isize| {
-            let at = this.slot(row, j);
-            this.is_dark(at) && this.is_flat(at)
-        };
-        let mut start = 0;
-        while start < columns {
-            let mut end = start;
-            while end < columns && empty(self, end) {
-                end += 1;
-            }
-            let mut left = start..end;
-            while !left.is_empty() {
-                let mut run = left.clone();
-                // halved until nothing is in it, or it is one pixel
-                while !run.is_empty() && self.reaches(row, &run) {
-                    if run.len() == 1 {
-                        let at = self.slot(row, run.start) + self.stride - 1;
-                        self.lines.set(at, f64::INFINITY);
-                        break;
-                    }
-                    run.end = run.start + run.len() as isize / 2;
-                }
-                left.start = run.end;
-            }
-            start = end + 1;
-        }
-    }
-
-    /// Whether fronts of facets may reach into a pixel whose centre shows none.
-    fn is_thin(&self, row: isize, column: isize) -> bool {
-        let end = self.slot(row, column) + self.stride;
-        let empty = self.is_dark(end - self.stride);
-        self.lines.at(end - 1) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
-    }
-
-    /// Whether a pixel's centre shows no facet, or a black back.
-    fn is_dark(&self, at: usize) -> bool {
-        let terms = self.lines.part(at..at + 3 * self.solved.shape.bands);
-        self.lines.at(at + self.stride - NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
-    }
-
-    /// Whether the front of a facet may reach into some pixels of a row.
-    #[inline(never)]
-    fn reaches(&self, row: isize, columns: &Range<isize>) -> bool {
-        let (left, right) = (columns.start as f64, columns.end as f64);
-        let (top, bottom) = (row as f64, row as f64 + 1.0);
-        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
-        let eye = self.camera.ray(0.5 * (left + right), 0.5 * (top + bottom));
-        let inside = eye.origin + eye.direction;
-        let halves = [0, 1, 2, 3].map(|side| {
-            let [one, other] =
-                [corners.at(side), corners.at((side + 1) % 4)].map(|(x, y)| self.camera.ray(x, y));
-            let along = other.origin + other.direction - (one.origin + one.direction);
-            let normal = unit(one.direction.cross(along)).unwrap_or(Vec3::ZERO);
-            let height = normal.dot(one.origin);
-            if normal.dot(inside) >= height {
-                Half { normal, height }
-            } else {
-                Half { normal: -normal, height: -height }
-            }
-        });
-        let mut found = false;
-        let (bvh, two_sided) = (self.solved.bvh, self.solved.scene.sides() == 2);
-        bvh.within(&halves, |facet: u32| {
-            let front = |([a, ..], normal): ([Vec3; 3], Vec3)| {
-                normal.dot(if self.camera.is_parallel() { -eye.direction } else { eye.origin - a }) > 0.0
-            };
-            found = two_sided || bvh.corners(facet).is_some_and(front);
-            !found
-        });
-        found
-    }
-
     /// Whether a pixel keeps its centre's value.
     fn is_flat(&self, at: usize) -> bool {
         let end = at + self.stride;
@@ -619,7 +543,9 @@ impl<'a> Painter<'a, '_> {
     /// The mean over a pixel's square to about the error `goal`; returns the error expected.
     fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
         self.tally.refined += 1;
-        self.look_about(row, column);
+        if self.solved.gathers() {
+            self.look_about(row, column);
+        }
         let mut sampled = false;
         let measure = self.measure();
         let (mut along, mut down) = (0.0, 0.0);
@@ -632,18 +558,17 @@ impl<'a> Painter<'a, '_> {
             along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
             down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
         }
-        let mut contrast = along.max(down);
-        if contrast <= COARSE * goal && self.is_thin(row, column) {
-            // scattered rays are few, and may all miss it
-            contrast = f64::INFINITY;
-        }
+        let contrast = along.max(down);
+        let steep = contrast > COARSE * goal;
+        // scattered rays are few, and may all miss what is thin
+        let thin = !steep && self.is_thin(row, column);
         if !sampled
-            && contrast > COARSE * goal
+            && (steep || thin)
             && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal)
         {
             return error;
         }
-        let contrast = if contrast.is_finite() { contrast } else { 1.0 };
+        let contrast = if thin { 1.0 } else { contrast };
         self.scatter(target, index, (row, column), contrast, goal)
     }
 

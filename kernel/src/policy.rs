@@ -71,10 +71,20 @@ pub fn beams(
     Some(BeamSettings::new(scene, sun, rays, sun_image::CUTOFF * tolerance, mirrors))
 }
 
+/// Elements of which so many tolerances of error are expected are mended by rays from points in every image: few are.
+const GATHER: f64 = 3.0;
+
 /// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for that
 /// as another round of a coupling that took `rays`.
 pub fn chains(tolerance: f64, max_bounces: Option<u32>, rays: u64) -> ChainSettings {
-    ChainSettings::new(tolerance, max_bounces, rays.saturating_mul(4))
+    ChainSettings {
+        cutoff: 0.05 * tolerance,
+        max_bounces,
+        tolerance,
+        sky_error: sky_accuracy(tolerance),
+        gather: GATHER,
+        rays: rays.saturating_mul(4),
+    }
 }
 
 /// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.

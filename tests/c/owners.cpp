@@ -130,8 +130,12 @@ int main() {
         rounds.push_back(lit.report(lit.image(camera).tally));
     }
     REQUIRE(!rounds.empty() && rounds.size() <= 3);
-    // without the standard library a few elements beside contacts may carry the estimate, and a finer round bring nothing
-    REQUIRE(rounds.back().error_estimate <= 1.05 * rounds[0].error_estimate);
+#ifdef BLIK_NO_STD
+    const double worse = 1.05; // elements beside contacts, which nothing mends there, carry it: a finer round brings little
+#else
+    const double worse = 1;
+#endif
+    REQUIRE(rounds.back().error_estimate <= worse * rounds[0].error_estimate);
     blik_report coarse{};
     coarse.tolerance = 1e-3;
     coarse.error_estimate = 2e-3;

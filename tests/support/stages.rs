@@ -306,8 +306,7 @@ impl Stage<'_> {
         means.fill(0.0);
         let mut noting = Noting { slots, thrown: means };
         beam::add(&thrown, (self.coupling, elements), sun, self.shape, direct, &mut noting);
-        counts.beams =
-            thrown.rows(0..mirrors).map(|(_, r)| u64::from(r.row.rays) + u64::from(r.row.chain_rays)).sum();
+        counts.beams = thrown.rows(0..mirrors).map(|(_, r)| r.row.all_rays()).sum();
         Ok(())
     }
 

@@ -6,12 +6,12 @@
 //! deviation s: about s n^-3/4. Where facets hide little of the sky, its irradiance is the exact one of the plane less what
 //! they hide.
 
-use super::{How, Leg, Path, Sample, Solved, Terms};
+use super::{How, Leg, Path, Sample, Solved, Terms, linear};
 use crate::arena::plain_table;
+use crate::element::Local;
 use crate::index::{Index, IndexMut};
 use crate::math::{PI, Vec3, clamp, frame, pow, sqrt};
 use crate::mirror::Surface;
-use crate::policy::sky_accuracy;
 use crate::qmc::{Sequence, cosine_direction, hash2};
 use crate::scene::MAX_BANDS;
 
@@ -125,16 +125,13 @@ impl Gathered {
     }
 
     /// Two parts each become one, and make room for two new ones.
-    fn halve(&mut self, bands: usize) {
+    fn halve(&mut self) {
         for sums in [&mut self.beyond, &mut self.open] {
             for part in 0..PARTS {
-                let pair = [2 * part, 2 * part + 1].map(|from| sums.get(from).copied());
-                let (Some(to), [a, b]) = (sums.get_mut(part), pair) else { return };
-                let of = |sums: &Option<[f64; BANDS]>, band: usize| sums.as_ref().map_or(0.0, |s| s.at(band));
-                to.iter_mut()
-                    .enumerate()
-                    .take(bands)
-                    .for_each(|(band, to)| *to = of(&a, band) + of(&b, band));
+                let [a, b] =
+                    [2 * part, 2 * part + 1].map(|from| sums.get(from).copied().unwrap_or([0.0; BANDS]));
+                let to = sums.get_mut(part).into_iter().flatten();
+                to.zip(a.iter().zip(&b)).for_each(|(to, (a, b))| *to = a + b);
             }
         }
     }
@@ -149,8 +146,9 @@ pub(super) fn usual_rays(tolerance: f64) -> f64 {
 pub(super) struct Spot<'a> {
     pub surface: &'a Surface,
     pub unknown: usize,
-    /// Irradiance of its element there in one band.
-    pub smooth: &'a dyn Fn(usize) -> f64,
+    /// Irradiance of its element, mean and gradients, and where on it the point is.
+    pub values: &'a [f64],
+    pub local: Local,
     /// What a radiance of 1 brings to the image.
     pub weight: f64,
 }
@@ -162,10 +160,15 @@ impl Solved<'_> {
     #[inline]
     pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
         let most = self.settings.gather * self.settings.tolerance;
-        GATHERS
+        self.gathers()
             && weight * weight * variance > most * most
-            && self.shape.levels == 1
             && (self.light.sun.is_none() || self.mirrors_are_flat() && self.knows_images(surface))
+    }
+
+    /// Whether any point may want rays.
+    #[inline]
+    pub(crate) fn gathers(&self) -> bool {
+        GATHERS && self.shape.levels == 1
     }
 
     fn knows_images(&self, surface: &Surface) -> bool {
@@ -229,6 +232,7 @@ impl Solved<'_> {
         let least = clamp(usual_rays(tolerance), FEWEST, MOST);
         let most = clamp(MOST_TIMES * least, FEWEST, MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
+        gathered.sky.fill(0.0);
         gathered.carried = 0.0;
         // fewer may all miss what little is bright, and agree
         let (mut done, mut rays) = (0, (least as u32).next_power_of_two());
@@ -246,7 +250,7 @@ impl Solved<'_> {
             if exact.min(plain) <= goal || 2 * rays > most {
                 return Some((exact <= plain, rays));
             }
-            gathered.halve(self.shape.bands);
+            gathered.halve();
             (done, rays) = (rays, 2 * rays);
         }
     }
@@ -284,8 +288,7 @@ impl Solved<'_> {
         path.rays += inner.rays;
         *carried += sqrt(inner.variance);
         for (band, (sum, sky)) in beyond.iter_mut().zip(&*sky).enumerate().take(bands) {
-            let sky = if self.light.sky.is_some() { *sky } else { 0.0 };
-            *sum += terms.sum(band) - sky;
+            *sum += terms.sum(band) - *sky;
         }
         Some(())
     }
@@ -295,14 +298,13 @@ impl Solved<'_> {
         let bands = self.shape.bands.min(BANDS);
         gathered.sky.fill(0.0);
         if let (true, Some(sky)) = (exact, &self.light.sky) {
-            let accuracy = sky_accuracy(self.settings.tolerance);
-            sky.irradiance(spot.surface.normal, accuracy, gathered.sky.head_mut(bands));
+            sky.irradiance(spot.surface.normal, self.settings.sky_error, gathered.sky.head_mut(bands));
         }
         for band in 0..bands {
             let (mean, _) = gathered.mean(band, rays, exact);
             let irradiance = PI * mean + gathered.sky.at(band);
             if let Some(corrections) = gathered.corrections.get_mut(place) {
-                corrections.set(band, irradiance - (spot.smooth)(band));
+                corrections.set(band, irradiance - linear(spot.values, bands, spot.local, band));
             }
         }
         let carried = gathered.carried / f64::from(rays);

@@ -135,7 +135,6 @@ impl Report {
     /// Counts what the coupling's rows did.
     pub(super) fn count_rows(&mut self, coupling: &Coupling<'_>) {
         let (mut skipped, mut open) = (0, 0);
-        self.rays.visibility += coupling.rays();
         for (_, row) in coupling.rows(0..coupling.unknowns()) {
             self.pairs.sampled += row.targets.len() as u64;
             self.certified.dropped = self.certified.dropped.max(row.row.lost);
