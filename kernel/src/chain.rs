@@ -1,15 +1,18 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
 
+mod crowd;
 mod gather;
 mod outlook;
 mod sunlight;
 
+use crowd::CROWDED;
 use gather::{Gathered, Spot};
 pub(crate) use outlook::{Outlook, Way};
 
 use crate::arena::plain_table;
 use crate::bvh::Bvh;
+use crate::camera::Camera;
 use crate::element::{Elements, Local};
 use crate::index::{Index, IndexMut, copy};
 use crate::light::{Light, Shape};
@@ -37,6 +40,8 @@ pub struct ChainSettings {
     pub gather: f64,
     /// Rays that an image may take for that.
     pub rays: u64,
+    /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
+    pub pixel: (f64, f64),
 }
 
 /// [`ChainSettings::gather`] where all pixels of an image may take rays.
@@ -45,9 +50,12 @@ const GATHER_ALL: f64 = 0.6;
 impl ChainSettings {
     /// The same for an image of so many pixels of facets that reflect `diffuse` at most: where the rays suffice for all of
     /// them, all but the best elements are mended.
-    pub(crate) fn of_image(self, pixels: usize, diffuse: f64) -> ChainSettings {
-        let rays = pixels as f64 * gather::usual_rays(self.tolerance / diffuse.max(f64::MIN_POSITIVE));
-        ChainSettings { gather: if rays <= self.rays as f64 { GATHER_ALL } else { self.gather }, ..self }
+    pub(crate) fn of_image(self, camera: &Camera, diffuse: f64) -> ChainSettings {
+        let pixels = (camera.columns() * camera.rows()) as f64;
+        let rays = pixels * gather::usual_rays(self.tolerance / diffuse.max(f64::MIN_POSITIVE));
+        let gather = if rays <= self.rays as f64 { GATHER_ALL } else { self.gather };
+        let area = camera.pixel_area();
+        ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }
     }
 
     /// The same for sums over so many rays that errors of single elements count little.
@@ -259,6 +267,8 @@ struct Leg<'w> {
     lobes: u32,
     /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
     lobe: bool,
+    /// Length of the way up to its ray.
+    far: f64,
     /// True where the sun's disc does not count.
     sunless: bool,
     /// For the sun's images.
@@ -375,8 +385,17 @@ impl Solved<'_> {
         let Work { through: [through, next], sums, squares, before, images, gathered } = work;
         through.head_mut(self.shape.bands).fill(1.0);
         let (sunless, gathered) = (false, Some(gathered));
-        let mut leg =
-            Leg { ray: *ray, through, mirrors: 0, lobes: 0, lobe: false, sunless, images, gathered };
+        let mut leg = Leg {
+            ray: *ray,
+            through,
+            mirrors: 0,
+            lobes: 0,
+            lobe: false,
+            far: 0.0,
+            sunless,
+            images,
+            gathered,
+        };
         let how = &mut How { sample, outlook, branches: true };
         if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
             let mut fan =
@@ -402,6 +421,7 @@ impl Solved<'_> {
                 return None;
             };
             path.object |= leg.mirrors == 0;
+            leg.far += met.t;
             let surface = Surface::of_hit(self.scene, &met)?;
             self.add_diffuse(leg, &surface, how, terms, path);
             let mirror = surface.mirror(self.scene)?;
@@ -543,12 +563,12 @@ impl Solved<'_> {
         let sample = Sample::OneOf { seed: how.sample.seed(), index: fan.count };
         let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
         let hit = self.bvh.closest(&ray);
-        let (mirrors, lobes, gathered) = (leg.mirrors, leg.lobes, leg.gathered.take());
+        let (mirrors, lobes, far, gathered) = (leg.mirrors, leg.lobes, leg.far, leg.gathered.take());
         (leg.ray, leg.lobe) = (ray, true);
         core::mem::swap(&mut leg.through, &mut fan.through);
         self.follow(leg, hit, &mut how, fan.terms, &mut fan.path);
         core::mem::swap(&mut leg.through, &mut fan.through);
-        (leg.mirrors, leg.lobes, leg.gathered) = (mirrors, lobes, gathered);
+        (leg.mirrors, leg.lobes, leg.far, leg.gathered) = (mirrors, lobes, far, gathered);
         for (b, (square, before)) in fan.squares.iter_mut().zip(fan.before.iter()).enumerate().take(bands) {
             let value = fan.terms.sum(b) - before;
             *square += value * value;
@@ -616,6 +636,9 @@ impl Solved<'_> {
         }
         let mut variance = f64::from(self.variance.at(unknown));
         let mut correction: &[f64] = &[];
+        if leg.gathered.is_some() && self.is_crowded(surface, unknown, leg.far) {
+            variance = variance.max(CROWDED * CROWDED);
+        }
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {

@@ -157,8 +157,9 @@ fn check(rows: &[Row]) {
     }
     let honest = rows.iter().filter(|r| r.honest()).count();
     println!("{honest} of {} errors at most their estimates", rows.len());
-    // worse than on scenes as they come (tests/README.md); the families in which most are above are told in stress.md
-    assert!(honest * 100 >= rows.len() * 75, "{honest} of {}", rows.len());
+    // what is promised of all of them; of the short form's two dozen, two may fail by chance
+    let most = if rows.len() >= 300 { rows.len() / 20 } else { 2 };
+    assert!(rows.len() - honest <= most, "{honest} of {}", rows.len());
     for row in rows {
         assert!(
             row.ratio() <= 10.0,

@@ -16,7 +16,7 @@ use crate::qmc::{Sequence, cosine_direction, hash2};
 use crate::scene::MAX_BANDS;
 
 /// Where the stack and memory are small nothing is gathered.
-const GATHERS: bool = cfg!(feature = "std");
+pub(super) const GATHERS: bool = cfg!(feature = "std");
 
 /// Bands for which there is room.
 const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
@@ -281,8 +281,17 @@ impl Solved<'_> {
         }
         terms.clear(bands);
         through.head_mut(bands).fill(1.0);
-        let mut leg =
-            Leg { ray, through, mirrors: 0, lobes: 0, lobe: false, sunless: true, images, gathered: None };
+        let mut leg = Leg {
+            ray,
+            through,
+            mirrors: 0,
+            lobes: 0,
+            lobe: false,
+            far: 0.0,
+            sunless: true,
+            images,
+            gathered: None,
+        };
         let mut inner = Path::default();
         self.follow(&mut leg, hit, how, terms, &mut inner);
         path.rays += inner.rays;

@@ -185,15 +185,27 @@ impl<'m> Sink<'m> {
     }
 }
 
-/// Adds up neighbours that are the same and returns how many records are left.
+/// Adds up neighbours that are the same and returns how many records are left. Their weights are summed with what each
+/// addition rounds off: thousands of equal ones would all be rounded the same way.
 fn merge(row: &mut [Record], join: impl Fn(&mut Record, &Record) -> bool) -> usize {
-    let mut kept: usize = 0;
+    let (mut kept, mut lost) = (0usize, 0.0);
     for i in 0..row.len() {
         let record = row.at(i);
-        if !row.get_mut(kept.wrapping_sub(1)).is_some_and(|last| join(last, &record)) {
-            row.set(kept, record);
-            kept += 1;
+        if let Some(last) = row.get_mut(kept.wrapping_sub(1)) {
+            let before = last.weight;
+            if join(last, &record) {
+                // Knuth's two-sum
+                let added = last.weight - before;
+                lost += (before - (last.weight - added)) + (record.weight - added);
+                continue;
+            }
+            last.weight += core::mem::take(&mut lost);
         }
+        row.set(kept, record);
+        kept += 1;
+    }
+    if let Some(last) = row.get_mut(kept.wrapping_sub(1)) {
+        last.weight += lost;
     }
     kept
 }
