@@ -11,14 +11,18 @@ use std::time::Instant;
 use support::references::{self, FacetReference, Reference};
 use support::{metric, scene_file, twin};
 
-/// The project's goal at the default tolerance of 2e-3, for images and irradiances over pi alike.
-const GOAL: f64 = 5e-3;
+/// Images keep the default tolerance.
+const GOAL: f64 = 2e-3;
+
+/// Irradiances over pi: the tolerance is one of images, whose facets reflect a tenth to four tenths of it.
+const FACETS_GOAL: f64 = 5e-3;
 
 /// The mesh of 100,000 facets takes more than 10 s where tests run.
 const LARGE: &str = "bowl_100k";
 
 /// One line of the table.
 struct Outcome {
+    /// Over the pixels where the reference's own ray offset does not matter.
     eps: f64,
     facets: Option<Facets>,
     bytes: Bytes,
@@ -47,15 +51,22 @@ fn run(reference: &Reference) -> Outcome {
     solve(&scene, &settings, |host, lit| {
         let image = host.image(lit, &kernel::camera(&camera), false).unwrap();
         let seconds = start.elapsed().as_secs_f64();
-        let eps = metric::eps(&image.pixels, &reference.image().values, &reference.counted(), &[1.0]);
-        let (_, eps) = metric::worst(&eps);
-        let eps = metric::corrected(eps, reference.image_standard_error);
+        let (counted, sound) = (reference.counted(), reference.sound(&scene, &camera));
+        let left_out = metric::pixels(&counted) - metric::pixels(&sound);
+        let [all, eps] = [counted, sound].map(|pixels| {
+            let eps = metric::eps(&image.pixels, &reference.image().values, &pixels, &[1.0]);
+            metric::corrected(metric::worst(&eps).1, reference.image_standard_error)
+        });
         let facets = reference.facets.as_ref().map(|f| compare_facets(&scene, &irradiances(lit), f));
         let columns = facets.as_ref().map_or(String::new(), |f| {
             format!(", facets {:.2e}, without {} narrow ones {:.2e}", f.all, f.narrow, f.wide)
         });
         let estimate = image.report.error_estimate;
-        println!("{:24} eps_c {eps:.2e}, estimate {estimate:.2e}, {seconds:.1} s{columns}", reference.id);
+        println!(
+            "{:24} eps_c {all:.2e}, without {left_out} pixels led astray {eps:.2e}, estimate {estimate:.2e}, \
+             {seconds:.1} s{columns}",
+            reference.id
+        );
         Outcome { eps, facets, bytes: image.report.bytes }
     })
 }
@@ -65,7 +76,7 @@ fn run(reference: &Reference) -> Outcome {
 fn is_wide(scene: &twin::Scene, facet: usize) -> bool {
     let [a, b, c] = scene.corners[facet];
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
-    let offset = 9e-5 * (1.0 + ((a + b + c) / 3.0).length());
+    let offset = references::OFFSET * (1.0 + ((a + b + c) / 3.0).length());
     2.0 * scene.areas[facet] / longest >= 10.0 * offset
 }
 
@@ -86,7 +97,7 @@ fn check(reference: &Reference) -> Outcome {
     let outcome = run(reference);
     assert!(outcome.eps <= GOAL, "{}: eps_c {:.2e}", reference.id, outcome.eps);
     if let Some(facets) = &outcome.facets {
-        assert!(facets.wide <= GOAL, "{}: irradiance/pi off by {:.2e} rms", reference.id, facets.wide);
+        assert!(facets.wide <= FACETS_GOAL, "{}: irradiance/pi off by {:.2e} rms", reference.id, facets.wide);
     }
     outcome
 }

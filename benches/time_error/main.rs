@@ -71,7 +71,7 @@ struct Row {
     scene: String,
     asked: f64,
     estimate: f64,
-    /// eps over the counted pixels, the reference's standard error and eps_c, what is left without it.
+    /// eps over the pixels in which the reference is right, the reference's standard error and eps_c, what is left without it.
     eps: f64,
     noise: f64,
     corrected: f64,
@@ -126,6 +126,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Runs one reference at one tolerance.
 fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result<Row, Box<dyn Error>> {
     let (scene, camera) = scene_file::read(&reference.scene);
+    let sound = reference.sound(&scene, &camera);
     let settings = Settings {
         tolerance,
         reference_radiance: Some(vec![1.0]),
@@ -154,7 +155,7 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
         outcome = Some(image);
     }
     let image = outcome.expect("one run at least");
-    let eps = metric::eps(&image.pixels, &reference.image().values, &reference.counted(), &[1.0])[0];
+    let eps = metric::eps(&image.pixels, &reference.image().values, &sound, &[1.0])[0];
     let noise = reference.image_standard_error;
     let Report { error_estimate, rays, bytes, .. } = image.report;
     Ok(Row {

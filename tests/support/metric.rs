@@ -7,6 +7,11 @@ pub fn counted(hit: &[bool], disputed: &[bool]) -> Vec<bool> {
     hit.iter().zip(disputed).map(|(&hit, &disputed)| hit && !disputed).collect()
 }
 
+/// How many of them there are.
+pub fn pixels(counted: &[bool]) -> usize {
+    counted.iter().filter(|&&c| c).count()
+}
+
 /// eps of eq. 16 per band: the rms of `image - reference` over the counted pixels, divided by the band's reference
 /// radiance.
 ///
@@ -16,7 +21,7 @@ pub fn eps(image: &[f32], reference: &[f32], counted: &[bool], reference_radianc
     let bands = reference_radiance.len();
     assert_eq!(image.len(), counted.len() * bands, "image");
     assert_eq!(reference.len(), counted.len() * bands, "reference");
-    let pixels = counted.iter().filter(|&&c| c).count();
+    let pixels = pixels(counted);
     assert!(pixels > 0, "no pixel counts");
     let mut squares = vec![0.0; bands];
     let both = image.chunks(bands).zip(reference.chunks(bands));

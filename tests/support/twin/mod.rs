@@ -16,7 +16,7 @@ mod walk;
 
 pub use dense::{Dense, solve_linear};
 pub use light::{Model, Sky, Sun, lobe, lobe_sample};
-pub use scene::{Material, Scene};
+pub use scene::{Material, Meeting, Scene};
 pub use sequence::{Estimate, Kronecker, Rng, estimate};
 pub use walk::{Effort, facet_irradiance, radiance};
 
