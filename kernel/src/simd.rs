@@ -1,4 +1,4 @@
-//! Choice of the instruction set at run time, without the standard library.
+//! Choice of the instruction set without the standard library: at run time on x86-64, by the target on 64-bit ARM.
 //!
 //! The same source is compiled once per instruction set; none contracts `a * b + c`, so all give the same bits.
 
@@ -24,7 +24,7 @@ enum Level {
 }
 
 impl Isa {
-    /// What every processor of the target has, for plain arrays.
+    /// What every processor of the target has.
     pub const BASELINE: Isa = Isa(Level::Baseline);
 
     /// The widest that this processor and operating system support.
