@@ -1,4 +1,4 @@
-//! Choice of the instruction set at run time, without the standard library.
+//! Choice of the instruction set without the standard library: at run time on x86-64, by the target on 64-bit ARM.
 //!
 //! The same source is compiled once per instruction set; none contracts `a * b + c`, so all give the same bits.
 
@@ -19,6 +19,8 @@ enum Level {
     /// AVX-512F, and AVX2.
     #[cfg(target_arch = "x86_64")]
     Avx512,
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    Neon,
 }
 
 impl Isa {
@@ -38,23 +40,33 @@ impl Isa {
                 return Isa(Level::Avx2);
             }
         }
+        // no question for the processor: where the target has NEON, all of its processors have
+        #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+        return Isa(Level::Neon);
+        #[allow(unreachable_code)]
         Isa::BASELINE
     }
 
     /// Those that this processor has.
     #[cfg(test)]
     pub(crate) fn all() -> impl Iterator<Item = Isa> {
-        #[cfg(target_arch = "x86_64")]
         let all = match Isa::detect().0 {
             Level::Baseline => &[Level::Baseline][..],
+            #[cfg(target_arch = "x86_64")]
             Level::Avx2 => &[Level::Baseline, Level::Avx2],
+            #[cfg(target_arch = "x86_64")]
             Level::Avx512 => &[Level::Baseline, Level::Avx2, Level::Avx512],
+            #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+            Level::Neon => &[Level::Baseline, Level::Neon],
         };
-        #[cfg(not(target_arch = "x86_64"))]
-        let all = [Level::Baseline];
         all.iter().map(|level| Isa(*level))
     }
 }
+
+/// Whether the baseline uses NEON as well: beside it arrays serve for comparison alone, and their code is no use where
+/// memory is scarce.
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+const LEAN: bool = cfg!(not(any(test, feature = "std")));
 
 /// A computation to be compiled for each instruction set; `run` must be `#[inline(always)]`.
 pub trait Task {
@@ -143,6 +155,10 @@ pub fn run_lanes<T: LaneTask>(isa: Isa, task: T) -> T::Out {
         // SAFETY: levels other than the baseline come from `Isa::detect` alone, which saw the processor's flag.
         return unsafe { avx2(task) };
     }
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    if isa != Isa::BASELINE || LEAN {
+        return task.run(neon::Neon);
+    }
     let _ = isa;
     task.run(Arrays)
 }
@@ -168,6 +184,10 @@ pub fn run_wide<T: WideTask>(isa: Isa, task: T) -> T::Out {
             // SAFETY: as above.
             Level::Avx512 => return unsafe { avx512(task) },
         }
+    }
+    #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+    if isa != Isa::BASELINE || LEAN {
+        return task.run(wide::neon::Neon);
     }
     let _ = isa;
     task.run(wide::Arrays)
@@ -386,6 +406,224 @@ mod avx2 {
                 let low = _mm256_and_si256(x, _mm256_set1_epi32(0xffff));
                 (_mm256_cvtepi32_ps(_mm256_srli_epi32::<16>(x)), _mm256_cvtepi32_ps(low))
             }
+        }
+    }
+}
+
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+#[allow(unsafe_code)]
+mod neon {
+    use core::arch::aarch64::*;
+
+    /// Compiled for targets alone whose processors all have NEON.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Neon;
+
+    /// Eight f32 in two registers.
+    #[derive(Clone, Copy, Debug)]
+    pub struct F8(float32x4_t, float32x4_t);
+
+    /// Eight masks in two registers.
+    #[derive(Clone, Copy, Debug)]
+    pub struct M8(uint32x4_t, uint32x4_t);
+
+    impl M8 {
+        #[inline(always)]
+        fn load(x: &[u32; 8]) -> M8 {
+            let (low, high) = x.split_at(4);
+            // SAFETY: the target has NEON; each half holds four numbers, and no alignment is asked.
+            unsafe { M8(vld1q_u32(low.as_ptr()), vld1q_u32(high.as_ptr())) }
+        }
+
+        /// One bit of each.
+        #[inline(always)]
+        fn bits(self) -> u32 {
+            const BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+            // SAFETY: the target has NEON; the array has as many bytes as the register, and no alignment is asked.
+            unsafe {
+                let masks = vcombine_u16(vmovn_u32(self.0), vmovn_u32(self.1));
+                vaddvq_u16(vandq_u16(masks, vld1q_u16(BITS.as_ptr()))).into()
+            }
+        }
+    }
+
+    macro_rules! neon {
+        ($($name:ident = $op:ident),*) => { $(
+            #[inline(always)]
+            fn $name(self, a: F8, b: F8) -> F8 {
+                // SAFETY: the target has NEON.
+                unsafe { F8($op(a.0, b.0), $op(a.1, b.1)) }
+            }
+        )* };
+    }
+
+    impl super::Lanes for Neon {
+        type F8 = F8;
+        type Same = float32x4_t;
+        type M8 = M8;
+        neon!(sub8 = vsubq_f32, add8 = vaddq_f32, mul8 = vmulq_f32, div8 = vdivq_f32);
+        // not `vminq_f32` and `vmaxq_f32`, which give NaN where one is, and the lesser or greater of two zeros
+        #[inline(always)]
+        fn min8(self, a: F8, b: F8) -> F8 {
+            // SAFETY: the target has NEON.
+            let less = unsafe { M8(vcltq_f32(a.0, b.0), vcltq_f32(a.1, b.1)) };
+            self.choose8(less, a, b)
+        }
+        #[inline(always)]
+        fn max8(self, a: F8, b: F8) -> F8 {
+            // SAFETY: the target has NEON.
+            let greater = unsafe { M8(vcgtq_f32(a.0, b.0), vcgtq_f32(a.1, b.1)) };
+            self.choose8(greater, a, b)
+        }
+        #[inline(always)]
+        fn splat8(self, x: f32) -> F8 {
+            self.lanes(self.same(x))
+        }
+        #[inline(always)]
+        fn same(self, x: f32) -> float32x4_t {
+            // SAFETY: the target has NEON.
+            unsafe { vdupq_n_f32(x) }
+        }
+        #[inline(always)]
+        fn lanes(self, x: float32x4_t) -> F8 {
+            F8(x, x)
+        }
+        #[inline(always)]
+        fn load8(self, x: &[f32; 8]) -> F8 {
+            let (low, high) = x.split_at(4);
+            // SAFETY: the target has NEON; each half holds four numbers, and no alignment is asked.
+            unsafe { F8(vld1q_f32(low.as_ptr()), vld1q_f32(high.as_ptr())) }
+        }
+        #[inline(always)]
+        fn store8(self, x: F8) -> [f32; 8] {
+            let mut out = [0.0; 8];
+            let (low, high) = out.split_at_mut(4);
+            // SAFETY: as for the load, into an array of our own.
+            unsafe {
+                vst1q_f32(low.as_mut_ptr(), x.0);
+                vst1q_f32(high.as_mut_ptr(), x.1);
+            }
+            out
+        }
+        #[inline(always)]
+        fn le8(self, a: F8, b: F8) -> u32 {
+            self.mask8(a, b).bits()
+        }
+        #[inline(always)]
+        fn mask8(self, a: F8, b: F8) -> M8 {
+            // SAFETY: the target has NEON.
+            unsafe { M8(vcleq_f32(a.0, b.0), vcleq_f32(a.1, b.1)) }
+        }
+        #[inline(always)]
+        fn choose8(self, mask: M8, a: F8, b: F8) -> F8 {
+            // SAFETY: the target has NEON.
+            unsafe { F8(vbslq_f32(mask.0, a.0, b.0), vbslq_f32(mask.1, a.1, b.1)) }
+        }
+        #[inline(always)]
+        fn mark8(self, marks: M8, mask: M8, bits: u32) -> M8 {
+            // SAFETY: the target has NEON.
+            unsafe {
+                let bits = vdupq_n_u32(bits);
+                M8(vorrq_u32(marks.0, vandq_u32(mask.0, bits)), vorrq_u32(marks.1, vandq_u32(mask.1, bits)))
+            }
+        }
+        #[inline(always)]
+        fn same8(self, a: &[u32; 8], x: u32) -> u32 {
+            let a = M8::load(a);
+            // SAFETY: the target has NEON.
+            let same = unsafe {
+                let x = vdupq_n_u32(x);
+                M8(vceqq_u32(a.0, x), vceqq_u32(a.1, x))
+            };
+            same.bits()
+        }
+        #[inline(always)]
+        fn none8(self) -> M8 {
+            // SAFETY: the target has NEON.
+            unsafe { M8(vdupq_n_u32(0), vdupq_n_u32(0)) }
+        }
+        #[inline(always)]
+        fn marks8(self, marks: M8) -> [u32; 8] {
+            // SAFETY: the target has NEON.
+            let numbers = unsafe { F8(vreinterpretq_f32_u32(marks.0), vreinterpretq_f32_u32(marks.1)) };
+            self.store8(numbers).map(f32::to_bits)
+        }
+        #[inline(always)]
+        fn root8(self, x: F8) -> F8 {
+            // SAFETY: the target has NEON.
+            unsafe { F8(vsqrtq_f32(x.0), vsqrtq_f32(x.1)) }
+        }
+        #[inline(always)]
+        fn halves8(self, x: &[u32; 8]) -> (F8, F8) {
+            let x = M8::load(x);
+            // SAFETY: the target has NEON.
+            unsafe {
+                let (upper, lower) = ((vshrq_n_u32::<16>(x.0), vshrq_n_u32::<16>(x.1)), vdupq_n_u32(0xffff));
+                let lower = (vandq_u32(x.0, lower), vandq_u32(x.1, lower));
+                (
+                    F8(vcvtq_f32_u32(upper.0), vcvtq_f32_u32(upper.1)),
+                    F8(vcvtq_f32_u32(lower.0), vcvtq_f32_u32(lower.1)),
+                )
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything that lanes can do, of two arrays of numbers and one of bits.
+    struct All([f32; 8], [f32; 8], [u32; 8]);
+
+    impl LaneTask for All {
+        type Out = ([[u32; 8]; 14], [u32; 2]);
+
+        #[inline(always)]
+        fn run<L: Lanes>(self, lanes: L) -> Self::Out {
+            let (a, b) = (lanes.load8(&self.0), lanes.load8(&self.1));
+            let mask = lanes.mask8(a, b);
+            let size = lanes.max8(b, lanes.splat8(1e-40));
+            let (upper, lower) = lanes.halves8(&self.2);
+            let values = [
+                lanes.add8(a, lanes.splat8(0.3)),
+                lanes.sub8(a, lanes.lanes(lanes.same(0.1))),
+                lanes.mul8(a, lanes.splat8(0.7)),
+                lanes.div8(lanes.splat8(1e-3), b),
+                lanes.min8(a, b),
+                lanes.min8(b, a),
+                lanes.max8(a, b),
+                lanes.max8(b, a),
+                lanes.choose8(mask, a, b),
+                lanes.root8(size),
+                upper,
+                lower,
+            ];
+            let mut bits = [[0; 8]; 14];
+            for (bits, value) in bits.iter_mut().zip(values) {
+                *bits = lanes.store8(value).map(f32::to_bits);
+            }
+            bits[12] = lanes.marks8(lanes.none8());
+            bits[13] = lanes.marks8(lanes.mark8(lanes.mark8(lanes.none8(), mask, 5), mask, 0x8000_0002));
+            (bits, [lanes.le8(a, b), lanes.same8(&self.2, 0x0003_ffff)])
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let (nan, infinity) = (f32::NAN, f32::INFINITY);
+        let a = [1.5, 0.0, -0.0, nan, 2.0, 3e-41, -infinity, nan];
+        let b = [-0.3, -0.0, 0.0, 4.0, nan, 7.0, 5e-39, -nan];
+        let halves = [0x0003_ffff, 0, u32::MAX, 0x8000_0001, 0x0003_ffff, 1, 0x1_0000, 0x0003_fffe];
+        let want = run_lanes(Isa::BASELINE, All(a, b, halves));
+        // the second where equal and where one is no number
+        assert_eq!(want.0[4], [-0.3, -0.0, 0.0, 4.0, nan, 3e-41, -infinity, -nan].map(f32::to_bits));
+        assert_eq!(want.0[7], [1.5, 0.0, -0.0, nan, 2.0, 7.0, 5e-39, nan].map(f32::to_bits));
+        assert_eq!(want.0[11].map(f32::from_bits), [65535.0, 0.0, 65535.0, 1.0, 65535.0, 1.0, 0.0, 65534.0]);
+        assert_eq!(want.0[13], [0, 1, 1, 0, 0, 1, 1, 0].map(|met| met * 0x8000_0007));
+        assert_eq!(want.1, [0b0110_0110, 0b0001_0001]);
+        for isa in Isa::all() {
+            assert_eq!(run_lanes(isa, All(a, b, halves)), want, "{isa:?}");
         }
     }
 }

@@ -375,6 +375,118 @@ pub(super) mod avx512 {
     }
 }
 
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+#[allow(unsafe_code)]
+pub(super) mod neon {
+    use super::{Add, BIAS, Div, FRACTION, INTEGER, Lanes64, Mul, ONE, Sub, WIDTH, Wide};
+    use core::arch::aarch64::*;
+
+    /// Compiled for targets alone whose processors all have NEON.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Neon;
+
+    /// Eight f64 in four registers.
+    #[derive(Clone, Copy, Debug)]
+    pub struct F8([float64x2_t; 4]);
+
+    macro_rules! operators {
+        ($($trait:ident $name:ident $op:ident),*) => { $(
+            impl $trait for F8 {
+                type Output = F8;
+                #[inline(always)]
+                fn $name(self, other: F8) -> F8 {
+                    let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+                    // SAFETY: the target has NEON.
+                    unsafe { F8([$op(a, e), $op(b, f), $op(c, g), $op(d, h)]) }
+                }
+            }
+        )* };
+    }
+    operators!(Add add vaddq_f64, Sub sub vsubq_f64, Mul mul vmulq_f64, Div div vdivq_f64);
+
+    impl Wide for F8 {
+        type Mask = [uint64x2_t; 4];
+        #[inline(always)]
+        fn array(self) -> [f64; WIDTH] {
+            let mut out = [0.0; WIDTH];
+            for (out, x) in out.as_chunks_mut::<2>().0.iter_mut().zip(self.0) {
+                // SAFETY: the target has NEON; a pair has as many bytes as the register, and no alignment is asked.
+                unsafe { vst1q_f64(out.as_mut_ptr(), x) };
+            }
+            out
+        }
+        #[inline(always)]
+        fn sqrt(self) -> F8 {
+            // SAFETY: the target has NEON.
+            F8(self.0.map(|x| unsafe { vsqrtq_f64(x) }))
+        }
+        #[inline(always)]
+        fn abs(self) -> F8 {
+            // SAFETY: the target has NEON.
+            F8(self.0.map(|x| unsafe { vabsq_f64(x) }))
+        }
+        #[inline(always)]
+        fn max(self, other: F8) -> F8 {
+            self.where_else(self.gt(other), other)
+        }
+        #[inline(always)]
+        fn gt(self, other: F8) -> [uint64x2_t; 4] {
+            let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+            // SAFETY: the target has NEON.
+            unsafe { [vcgtq_f64(a, e), vcgtq_f64(b, f), vcgtq_f64(c, g), vcgtq_f64(d, h)] }
+        }
+        #[inline(always)]
+        fn where_else(self, [i, j, k, l]: [uint64x2_t; 4], other: F8) -> F8 {
+            let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+            // SAFETY: the target has NEON.
+            unsafe { F8([vbslq_f64(i, a, e), vbslq_f64(j, b, f), vbslq_f64(k, c, g), vbslq_f64(l, d, h)]) }
+        }
+        #[inline(always)]
+        fn fraction(self) -> F8 {
+            // SAFETY: the target has NEON.
+            F8(self.0.map(|x| unsafe {
+                let fraction = vandq_u64(vreinterpretq_u64_f64(x), vdupq_n_u64(FRACTION));
+                vreinterpretq_f64_u64(vorrq_u64(fraction, vdupq_n_u64(ONE)))
+            }))
+        }
+        #[inline(always)]
+        fn exponent(self) -> F8 {
+            // SAFETY: the target has NEON.
+            F8(self.0.map(|x| unsafe {
+                let exponent = vshrq_n_u64::<52>(vreinterpretq_u64_f64(x));
+                let integer = vreinterpretq_f64_u64(vorrq_u64(exponent, vdupq_n_u64(INTEGER)));
+                vsubq_f64(integer, vdupq_n_f64(BIAS))
+            }))
+        }
+        #[inline(always)]
+        fn bits([a, b, c, d]: [uint64x2_t; 4]) -> u32 {
+            const BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+            // SAFETY: the target has NEON; the array has as many bytes as the register, and no alignment is asked.
+            unsafe {
+                let low = vcombine_u32(vmovn_u64(a), vmovn_u64(b));
+                let high = vcombine_u32(vmovn_u64(c), vmovn_u64(d));
+                let masks = vcombine_u16(vmovn_u32(low), vmovn_u32(high));
+                vaddvq_u16(vandq_u16(masks, vld1q_u16(BITS.as_ptr()))).into()
+            }
+        }
+    }
+
+    impl Lanes64 for Neon {
+        type F = F8;
+        #[inline(always)]
+        fn all(self, x: f64) -> F8 {
+            // SAFETY: the target has NEON.
+            F8([unsafe { vdupq_n_f64(x) }; 4])
+        }
+        #[inline(always)]
+        fn of(self, x: &[f64; WIDTH]) -> F8 {
+            let [a, b, c, d, e, f, g, h] = *x;
+            // SAFETY: the target has NEON; each pair has as many bytes as the register, and no alignment is asked.
+            F8([[a, b], [c, d], [e, f], [g, h]].map(|pair| unsafe { vld1q_f64(pair.as_ptr()) }))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
