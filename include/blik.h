@@ -717,6 +717,13 @@ typedef struct blik_settings {
      * goes on at a steady number of rays a second.
      */
     uint64_t ray_budget;
+    /**
+     * Where it is above 0 and below the tolerance, that is the solution's alone, and this the wanted error of images: rays
+     * from the points that an image shows find what a solution lacks that is there sooner. For few images of little error,
+     * which take longer each; default 0: the tolerance. No such rays are sent without the standard library, nor where
+     * `max_bounces` is given or lobes throw sunlight: the report's error estimate tells.
+     */
+    double image_tolerance;
 } blik_settings;
 
 /**
@@ -1330,7 +1337,7 @@ typedef struct blik_tally {
  */
 typedef struct blik_report {
     /**
-     * The wanted error.
+     * The wanted error, of the solution where images have one of their own.
      */
     double tolerance;
     /**
@@ -1390,7 +1397,7 @@ typedef struct blik_report {
      */
     uint32_t sweeps;
     /**
-     * 1 where the estimate is at most the tolerance.
+     * 1 where the estimate is at most the wanted error of images.
      */
     int32_t tolerance_met;
     /**
@@ -2173,10 +2180,12 @@ int32_t blik_get_report(const struct blik_solution *solution,
 
 /**
  * Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
- * number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
- * of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
- * better, would take too much, or has had three rounds. This is what the program `render` and the Rust interface go by;
- * an estimate of up to one and three quarters of the error asked for passes.
+ * number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the wanted error. Writes the
+ * tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be better, would take too
+ * much, or has had three rounds. With a null `report` it is the first round's: coarser than `asked` where that is little,
+ * since rays from the image's points find the rest; `image_tolerance` of the settings is `asked` in every round. This is
+ * what the program `render` and the Rust interface go by; an estimate of up to one and three quarters of the error asked
+ * for passes.
  */
 int32_t blik_next_tolerance(const struct blik_report *report,
                             const struct blik_report *before,

@@ -303,11 +303,12 @@ private:
     std::exception_ptr thrown_;
 };
 
-/* blik_settings with its defaults. */
-inline blik_settings settings(double tolerance = 2e-3) {
+/* blik_settings with its defaults; an image tolerance of 0 is the tolerance. */
+inline blik_settings settings(double tolerance = 2e-3, double image_tolerance = 0) {
     blik_settings value;
     blik_settings_init(&value);
     value.tolerance = tolerance;
+    value.image_tolerance = image_tolerance;
     return value;
 }
 
@@ -663,18 +664,15 @@ private:
  * reports; 0: no more.
  *
  *     std::vector<blik_report> rounds;
- *     for (double tolerance = 2e-3; tolerance != 0; tolerance = blik::next_tolerance(rounds, 2e-3)) {
- *         const blik::coupling coupling(scene, blik::settings(tolerance));
+ *     for (double tolerance = 0; (tolerance = blik::next_tolerance(rounds, 5e-4)) > 0;) {
+ *         const blik::coupling coupling(scene, blik::settings(tolerance, 5e-4));
  *         const blik::solution solution(coupling, light);
  *         image = solution.image(camera);
  *         rounds.push_back(solution.report(image.tally));
  *     }
  */
 inline double next_tolerance(view<const blik_report> rounds, double asked) {
-    if (rounds.empty()) {
-        return asked;
-    }
-    const blik_report *last = rounds.end() - 1;
+    const blik_report *last = rounds.empty() ? nullptr : rounds.end() - 1;
     blik_error info{};
     double tolerance = 0.0;
     check(blik_next_tolerance(last, rounds.size() > 1 ? last - 1 : nullptr, asked, static_cast<uint32_t>(rounds.size()),

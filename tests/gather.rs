@@ -8,6 +8,7 @@ use blik_kernel::arena::Memory;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::chain::{Sample, Solved, Terms};
 use blik_kernel::form_factor::point_to_polygon;
+use blik_kernel::host::Settings;
 use blik_kernel::image::{Target, rows, scratch_bytes};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
@@ -101,6 +102,41 @@ fn views_from_near_show_what_stands_there() {
         assert!(worst[0] < tolerance, "{worst:?}");
         assert!(worst[1] > 10.0 * tolerance, "its element alone would do here: {worst:?}");
     });
+}
+
+/// A solution that is ten times as coarse as the image is to be, and rays from the image's points.
+#[test]
+fn images_are_finer_than_their_solution() {
+    let (tolerance, coarse) = (1e-3, 1e-2);
+    let case = floor_and_wall(Material::spectral(&[0.0], &[0.0])).sky(SkyOf::uniform(1));
+    let camera = case::perspective([0.5, 3.0, 2.0], [0.0, 0.5, 0.0], 40.0, 12);
+    let wall = [[-2.0, 0.0], [-2.0, 2.0], [2.0, 2.0], [2.0, 0.0]].map(|[x, z]| Vec3::new(x, 0.0, z));
+    let settings = Settings { image_tolerance: Some(tolerance), ..within(coarse) };
+    let errors = [settings, within(coarse)].map(|settings| {
+        case.with_lit(1, &settings, |host, lit| {
+            let centres = CameraInput { sampling: Sampling::Centre, ..camera };
+            let image = host.image(lit, &centres, false).unwrap();
+            assert_eq!(image.report.tolerance, settings.image_tolerance.unwrap_or(coarse));
+            let rays = Camera::new(&centres, lit.solved().scene).unwrap();
+            let (mut sum, mut count) = (0.0, 0);
+            for (at, pixel) in image.pixels.iter().enumerate() {
+                let ray = rays.ray((at % 12) as f64 + 0.5, (at / 12) as f64 + 0.5);
+                let Some(hit) = lit.solved().bvh.closest(&ray) else { continue };
+                let scene = lit.solved().scene;
+                let place = (ray.origin + ray.direction * hit.t - scene.to_scene(Vec3::ZERO)) / scene.scale();
+                if hit.front && place.y > 1e-6 {
+                    let exact = RHO * (1.0 - point_to_polygon(place, Vec3::Z, &wall));
+                    sum += (f64::from(*pixel) - exact).powi(2);
+                    count += 1;
+                }
+            }
+            assert!(count > 60);
+            ((sum / f64::from(count)).sqrt(), image.report.error_estimate)
+        })
+    });
+    let [(fine, estimate), (alone, _)] = errors;
+    assert!(fine <= tolerance && fine <= estimate, "{fine:.1e}, estimated {estimate:.1e}");
+    assert!(alone > 2.0 * tolerance, "the solution alone would do: {alone:.1e}");
 }
 
 /// A block of a solved scene may be forged: its irradiances are within what is accepted, and beyond what is solved.

@@ -11,7 +11,7 @@ mod support;
 
 use blik_kernel::camera::CameraInput;
 use blik_kernel::form_factor::{Polygons, exchange_area};
-use blik_kernel::host::{Geometry, GeometryMemory, Host, Image, Lit, Settings};
+use blik_kernel::host::{Geometry, GeometryMemory, Host, Image, Lit, Rounds, Settings};
 use blik_kernel::math::Vec3;
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{SkyInput, SkyModel};
@@ -115,10 +115,16 @@ fn median(runs: usize, mut work: impl FnMut() -> Result<(), Box<dyn Error>>) -> 
 fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
     let before = processor_seconds();
     let (seconds, image) = timed(|| -> Result<Image, Box<dyn Error>> {
-        let mut memory = GeometryMemory::default();
-        let geometry = scene.geometry(host, &settings(tolerance, !scene.uniform()), &mut memory)?;
-        let lit = scene.light(host, &geometry)?;
-        Ok(host.image(&lit, &scene.camera, false)?)
+        let (mut memory, mut rounds) = (GeometryMemory::default(), Rounds::new(tolerance));
+        loop {
+            let settings = rounds.settings(settings(tolerance, !scene.uniform()));
+            let geometry = scene.geometry(host, &settings, &mut memory)?;
+            let lit = scene.light(host, &geometry)?;
+            let mut image = host.image(&lit, &scene.camera, false)?;
+            if !rounds.again(&mut image.report) {
+                return Ok(image);
+            }
+        }
     });
     let (image, processor) = (image?, processor_seconds() - before);
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_le_bytes()).collect();

@@ -15,7 +15,7 @@ mod processor;
 mod support;
 
 use blik_kernel::camera::CameraInput;
-use blik_kernel::host::{GeometryMemory, Host, Report, Settings};
+use blik_kernel::host::{GeometryMemory, Host, Report, Rounds, Settings};
 use chart::{Figure, Series};
 use processor::processor_seconds;
 use std::collections::BTreeMap;
@@ -128,7 +128,6 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
     let (scene, camera) = scene_file::read(&reference.scene);
     let sound = reference.sound(&scene, &camera);
     let settings = Settings {
-        tolerance,
         reference_radiance: Some(vec![1.0]),
         directional: !matches!(scene.sky.as_ref().map(|s| &s.model), Some(twin::Model::Uniform)),
         ..Settings::default()
@@ -141,18 +140,25 @@ fn run(host: &Host, reference: &Reference, tolerance: f64, limit: f64) -> Result
     let mut outcome = None;
     while cold.len() < RUNS && cold.last().is_none_or(|&s| s < 0.1 * limit) {
         let (before, start) = (processor_seconds(), Instant::now());
-        let mut memory = GeometryMemory::default();
-        let geometry = soup.with_input(|input| host.geometry(&mut memory, input, &settings))?;
-        let sky = scene.sky.as_ref().map(|sky| kernel::sky_input(sky, &sky_table));
-        let sun = scene.sun.as_ref().map(kernel::sun_input);
-        let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
-        let image = host.image(&lit, &camera, false)?;
-        cold.push(start.elapsed().as_secs_f64());
-        processor.push(processor_seconds() - before);
-        let start = Instant::now();
-        std::hint::black_box(host.image(&lit, &turned(&camera), false)?);
-        view.push(start.elapsed().as_secs_f64());
-        outcome = Some(image);
+        let (mut memory, mut rounds) = (GeometryMemory::default(), Rounds::new(tolerance));
+        loop {
+            let settings = rounds.settings(settings.clone());
+            let geometry = soup.with_input(|input| host.geometry(&mut memory, input, &settings))?;
+            let sky = scene.sky.as_ref().map(|sky| kernel::sky_input(sky, &sky_table));
+            let sun = scene.sun.as_ref().map(kernel::sun_input);
+            let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
+            let mut image = host.image(&lit, &camera, false)?;
+            if rounds.again(&mut image.report) {
+                continue;
+            }
+            cold.push(start.elapsed().as_secs_f64());
+            processor.push(processor_seconds() - before);
+            let start = Instant::now();
+            std::hint::black_box(host.image(&lit, &turned(&camera), false)?);
+            view.push(start.elapsed().as_secs_f64());
+            outcome = Some(image);
+            break;
+        }
     }
     let image = outcome.expect("one run at least");
     let eps = metric::eps(&image.pixels, &reference.image().values, &sound, &[1.0])[0];

@@ -50,6 +50,8 @@ impl Handle for blik_coupling {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
     pub tolerance: f64,
+    /// That of images.
+    pub image: f64,
     pub max_bounces: Option<u32>,
     pub all: bool,
     pub directional: bool,
@@ -66,8 +68,14 @@ impl Settings {
         // SAFETY: by the caller's promise.
         let settings = unsafe { read(settings) }?;
         policy::check_tolerance(settings.tolerance)?;
+        let image = match settings.image_tolerance {
+            0.0 => settings.tolerance,
+            given => given,
+        };
+        policy::check_tolerance(image)?;
         Ok(Settings {
             tolerance: settings.tolerance,
+            image: image.min(settings.tolerance),
             max_bounces: u32::try_from(settings.max_bounces).ok(),
             all: settings.all_irradiances != 0,
             directional: settings.directional != 0,
@@ -86,7 +94,7 @@ impl Settings {
 
     /// Those of a baked coupling.
     pub(crate) fn baked(tolerance: f64, max_bounces: Option<u32>, all: bool, directional: bool) -> Settings {
-        Settings { tolerance, max_bounces, all, directional, fit: false, budget: None }
+        Settings { tolerance, image: tolerance, max_bounces, all, directional, fit: false, budget: None }
     }
 
     /// The same for so many rows, within the budget.

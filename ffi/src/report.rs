@@ -1,6 +1,7 @@
 //! How good a result is, and what was done for it.
 
 use crate::call;
+use crate::coupling::Settings;
 use crate::memory::{needed, object};
 use crate::solution::blik_solution;
 use crate::status::*;
@@ -22,7 +23,7 @@ pub const BLIK_LIMIT_CHAIN: i32 = 4;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_report {
-    /// The wanted error.
+    /// The wanted error, of the solution where images have one of their own.
     pub tolerance: f64,
     /// Expected error of the image (eps of eq. 16), relative to the reference radiance.
     pub error_estimate: f64,
@@ -52,7 +53,7 @@ pub struct blik_report {
     pub bytes: usize,
     /// Sweeps over the linear system.
     pub sweeps: u32,
-    /// 1 where the estimate is at most the tolerance.
+    /// 1 where the estimate is at most the wanted error of images.
     pub tolerance_met: i32,
     /// The largest part of the estimate, `BLIK_LIMIT_*`.
     pub limited_by: i32,
@@ -81,7 +82,7 @@ pub unsafe extern "C" fn blik_get_report(
         }
         let coupling = solution.coupling.info()?;
         let (base, tables) = (solution.coupling.base, &solution.tables);
-        let tolerance = solution.coupling.settings.tolerance;
+        let Settings { tolerance, image, .. } = solution.coupling.settings;
         let (estimate, limit) = policy::estimate(&tally.kernel(), tables.solver);
         let report = blik_report {
             tolerance,
@@ -99,7 +100,7 @@ pub unsafe extern "C" fn blik_get_report(
             elements: coupling.elements,
             bytes: base.scene.memory() + base.bvh.memory() + coupling.bytes + tables.bytes,
             sweeps: tables.sweeps,
-            tolerance_met: i32::from(estimate <= tolerance),
+            tolerance_met: i32::from(estimate <= image),
             limited_by: match limit {
                 Limit::Nothing => BLIK_LIMIT_NOTHING,
                 Limit::Visibility => BLIK_LIMIT_VISIBILITY,
@@ -115,10 +116,12 @@ pub unsafe extern "C" fn blik_get_report(
 }
 
 /// Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
-/// number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the error that was wanted
-/// of the first. Writes the tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be
-/// better, would take too much, or has had three rounds. This is what the program `render` and the Rust interface go by;
-/// an estimate of up to one and three quarters of the error asked for passes.
+/// number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the wanted error. Writes the
+/// tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be better, would take too
+/// much, or has had three rounds. With a null `report` it is the first round's: coarser than `asked` where that is little,
+/// since rays from the image's points find the rest; `image_tolerance` of the settings is `asked` in every round. This is
+/// what the program `render` and the Rust interface go by; an estimate of up to one and three quarters of the error asked
+/// for passes.
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -133,7 +136,6 @@ pub unsafe extern "C" fn blik_next_tolerance(
 ) -> i32 {
     call(error, || {
         let to = needed(tolerance)?;
-        let last = needed(report.cast_mut())?;
         policy::check_tolerance(asked)?;
         let round = |report: &blik_report| Round {
             tolerance: report.tolerance,
@@ -142,11 +144,14 @@ pub unsafe extern "C" fn blik_next_tolerance(
             rays: report.visibility_rays,
             bytes: report.bytes,
         };
-        // SAFETY: not null, and valid by the caller's promise.
-        let (last, before) = unsafe { (round(last.as_ref()), before.as_ref().map(round)) };
-        let next = policy::again(asked, &last, before.as_ref(), rounds);
+        // SAFETY: null or valid by the caller's promise.
+        let (last, before) = unsafe { (report.as_ref().map(round), before.as_ref().map(round)) };
+        let next = match last {
+            None => policy::first(asked),
+            Some(last) => policy::again(asked, &last, before.as_ref(), rounds).unwrap_or(0.0),
+        };
         // SAFETY: not null.
-        unsafe { to.write(next.unwrap_or(0.0)) };
+        unsafe { to.write(next) };
         Ok(())
     })
 }

@@ -101,7 +101,11 @@ impl blik_solution {
             variance: self.tables.variance,
             reference: self.tables.reference,
             brightest: self.tables.brightest,
-            settings: policy::chains(settings.tolerance, settings.max_bounces, self.coupling.rays),
+            settings: policy::chains(
+                (settings.image, settings.tolerance),
+                settings.max_bounces,
+                self.coupling.rays,
+            ),
         }
     }
 }
@@ -278,8 +282,8 @@ impl Sizes {
 }
 
 fn beam_settings(coupling: &blik_coupling, sun: &Sun<'_>) -> Option<BeamSettings> {
-    let Settings { tolerance, max_bounces, all, .. } = coupling.settings;
-    policy::beams(&coupling.base.scene, sun, tolerance, max_bounces, all)
+    let Settings { image, max_bounces, all, .. } = coupling.settings;
+    policy::beams(&coupling.base.scene, sun, image, max_bounces, all)
 }
 
 /// Copies the caller's arrays, so that the light lives as long as its memory.
@@ -461,7 +465,7 @@ impl Shine<'_> {
     ) -> Result<u64, blik_error> {
         let (base, elements) = (self.coupling.base, &self.coupling.elements);
         if let Some(sky) = &self.light.sky {
-            let accuracy = policy::sky_accuracy(self.coupling.settings.tolerance);
+            let accuracy = policy::sky_accuracy(self.coupling.settings.image);
             runner.rows(direct, self.shape.stride(), SHARES[0], |range, out| {
                 light::sky_rows(&base.scene, elements, self.matrix, sky, accuracy, range, self.shape, out)
             })?;

@@ -27,6 +27,9 @@ const LINEAR: f64 = 11.0 / 3.0;
 /// quadratic functions at large, 1.8 beside walls, 2.4 for jumps.
 const DEPARTURE: f64 = 2.0;
 
+/// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
+const UNSEEN: f64 = 0.5;
+
 /// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
 const MOST_CARRIED: u32 = 12;
 
@@ -155,7 +158,9 @@ pub fn rows(
         let (unknown, row) = known.unwrap_or((unknown, row));
         row.gather(carried, sums);
         let own = differences.part(unknown * bands..(unknown + 1) * bands);
-        let square = |(&[_, own], &carried): (&Own, &f64)| f64::from(own) + carried * carried;
+        let unseen = UNSEEN / f64::from(row.row.rays).max(1.0);
+        let unseen = if row.row.rays > 0 { unseen * unseen } else { 0.0 };
+        let square = |(&[_, own], &carried): (&Own, &f64)| unseen + f64::from(own) + carried * carried;
         *out = narrow(own.iter().zip(&*sums).map(square).fold(0.0, f64::max));
     }
     Ok(())

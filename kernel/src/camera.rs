@@ -1,7 +1,8 @@
 //! Where the observer stands: pixel rays of orthographic and perspective cameras.
 
 use crate::error::{Error, Field};
-use crate::math::{FRAC_PI_2, Vec3, tan, unit};
+use crate::index::Index;
+use crate::math::{FRAC_PI_2, Vec3, fabs, sqrt, tan, unit};
 use crate::raster::Samples;
 use crate::ray::Ray;
 use crate::scene::Scene;
@@ -164,6 +165,19 @@ impl Camera {
     /// Area of a pixel of an orthographic image in scene coordinates; of a perspective one at distance 1.
     pub fn pixel_area(&self) -> f64 {
         4.0 * self.half.0 * self.half.1 / (self.columns as f64 * self.rows as f64)
+    }
+
+    /// Pixels that the fronts of the facets fill if none hides another; those around an eye count all.
+    pub(crate) fn most_pixels(&self, scene: &Scene<'_>) -> f64 {
+        let of = |facet: usize| {
+            let ([a, b, c], normal) = (scene.corners().at(facet), scene.normals().at(facet));
+            let from = if self.parallel { -self.forward } else { self.eye - (a + b + c) / 3.0 };
+            let cosine = from.dot(normal);
+            let seen = if scene.sides() == 2 { fabs(cosine) } else { cosine.max(0.0) };
+            let distance = if self.parallel { 1.0 } else { sqrt(from.length_squared()) };
+            scene.areas().at(facet) * seen / (distance * distance * distance).max(f64::MIN_POSITIVE)
+        };
+        (0..scene.facets()).map(of).sum::<f64>() / self.pixel_area()
     }
 
     /// Pixels across.

@@ -7,6 +7,7 @@ mod outlook;
 mod sunlight;
 
 use crowd::CROWDED;
+pub(crate) use gather::GATHERS;
 use gather::{Gathered, Spot};
 pub(crate) use outlook::{Outlook, Way};
 
@@ -40,6 +41,8 @@ pub struct ChainSettings {
     pub gather: f64,
     /// Rays that an image may take for that.
     pub rays: u64,
+    /// Whether the solution is coarser than the tolerance.
+    pub coarse: bool,
     /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
     pub pixel: (f64, f64),
 }
@@ -50,10 +53,21 @@ const GATHER_ALL: f64 = 0.6;
 impl ChainSettings {
     /// The same for an image of so many pixels of facets that reflect `diffuse` at most: where the rays suffice for all of
     /// them, all but the best elements are mended.
-    pub(crate) fn of_image(self, camera: &Camera, diffuse: f64) -> ChainSettings {
-        let pixels = (camera.columns() * camera.rows()) as f64;
-        let rays = pixels * gather::usual_rays(self.tolerance / diffuse.max(f64::MIN_POSITIVE));
-        let gather = if rays <= self.rays as f64 { GATHER_ALL } else { self.gather };
+    pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
+        let mut pixels = (camera.columns() * camera.rows()) as f64;
+        if self.coarse {
+            pixels = pixels.min(camera.most_pixels(scene));
+        }
+        let rays =
+            pixels * gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));
+        let gather = if rays <= self.rays as f64 {
+            GATHER_ALL
+        } else if self.coarse {
+            // most of it would have to be mended: a finer solution costs less
+            f64::INFINITY
+        } else {
+            self.gather
+        };
         let area = camera.pixel_area();
         ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }
     }

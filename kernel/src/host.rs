@@ -46,6 +46,10 @@ use std::vec::Vec;
 pub struct Settings {
     /// The wanted error of the image, eq. 16, relative to the reference radiance: 1e-6 to 0.1.
     pub tolerance: f64,
+    /// Where it is less than the tolerance, that is the solution's alone, and this the image's: rays from the points that it
+    /// shows find what a solution lacks that is there sooner. For few images of little error, which take longer each;
+    /// `None`: the tolerance.
+    pub image_tolerance: Option<f64>,
     /// Light reflected more often does not count; `None`: by tolerance.
     pub max_bounces: Option<u32>,
     /// Reference radiance, one value per band; `None`: from the light.
@@ -61,11 +65,19 @@ impl Default for Settings {
     fn default() -> Self {
         Settings {
             tolerance: 2e-3,
+            image_tolerance: None,
             max_bounces: None,
             reference_radiance: None,
             all_irradiances: false,
             directional: true,
         }
+    }
+}
+
+impl Settings {
+    /// The wanted error of images.
+    fn of_image(&self) -> f64 {
+        self.image_tolerance.map_or(self.tolerance, |image| image.min(self.tolerance))
     }
 }
 
@@ -173,10 +185,11 @@ impl Host {
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
         policy::check_tolerance(settings.tolerance)?;
+        policy::check_tolerance(settings.of_image())?;
         if let Some(reference) = &settings.reference_radiance {
             light::check_reference(reference, input.bands)?;
         }
-        let mut report = Report { tolerance: settings.tolerance, bands: input.bands, ..Report::default() };
+        let mut report = Report { tolerance: settings.of_image(), bands: input.bands, ..Report::default() };
         let mut clock = Clock::start();
         let GeometryMemory { scene: scene_memory, bvh: bvh_memory, elements: element_memory, slabs } = memory;
         *scene_memory = Memory::new(Scene::bytes(input)?);
@@ -291,7 +304,7 @@ impl Host {
         let unknowns = elements.unknowns();
         let mut direct = std::vec![0.0; unknowns * shape.stride()];
         if let Some(sky) = &light.sky {
-            let accuracy = policy::sky_accuracy(geometry.settings.tolerance);
+            let accuracy = policy::sky_accuracy(geometry.settings.of_image());
             self.split(&mut direct, shape.stride(), |range, out| {
                 light::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
             })?;
@@ -370,7 +383,8 @@ impl Host {
         suns: &mut Suns,
     ) -> Result<u64, Error> {
         let scene = &geometry.scene;
-        let Settings { tolerance, max_bounces, all_irradiances, .. } = geometry.settings;
+        let Settings { max_bounces, all_irradiances, .. } = geometry.settings;
+        let tolerance = geometry.settings.of_image();
         let Some(settings) = policy::beams(scene, sun, tolerance, max_bounces, all_irradiances) else {
             return Ok(0);
         };
@@ -663,7 +677,11 @@ impl Lit<'_> {
             variance: &self.variance,
             reference: &self.reference,
             brightest: self.brightest,
-            settings: policy::chains(settings.tolerance, settings.max_bounces, self.geometry.rays),
+            settings: policy::chains(
+                (settings.of_image(), settings.tolerance),
+                settings.max_bounces,
+                self.geometry.rays,
+            ),
         }
     }
 

@@ -4,7 +4,7 @@
 //! same bits.
 
 use crate::beam::BeamSettings;
-use crate::chain::ChainSettings;
+use crate::chain::{ChainSettings, GATHERS};
 use crate::coupling::rows::RowSettings;
 use crate::coupling::word::LONGEST;
 use crate::error::{Error, Field};
@@ -75,15 +75,17 @@ pub fn beams(
 const GATHER: f64 = 3.0;
 
 /// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for that
-/// as another round of a coupling that took `rays`.
-pub fn chains(tolerance: f64, max_bounces: Option<u32>, rays: u64) -> ChainSettings {
+/// as another round of a coupling that took `rays`, made for the solution's tolerance, the second of the two.
+pub fn chains((tolerance, solution): (f64, f64), max_bounces: Option<u32>, rays: u64) -> ChainSettings {
+    let growth = (solution / tolerance) * (solution / tolerance);
     ChainSettings {
         cutoff: 0.05 * tolerance,
         max_bounces,
         tolerance,
         sky_error: sky_accuracy(tolerance),
         gather: GATHER,
-        rays: rays.saturating_mul(4),
+        rays: (rays as f64 * 4.0 * growth) as u64,
+        coarse: solution > tolerance,
         pixel: (f64::INFINITY, 0.0),
     }
 }
@@ -264,10 +266,18 @@ const IDLE: f64 = 0.8;
 const MOST_RAYS: f64 = 2e8;
 const MOST_BYTES: f64 = (2u64 << 30) as f64;
 
+/// Solutions of images of less tolerance begin with this, and go on from it if rays from points cannot do the rest.
+const COARSE: f64 = 2e-3;
+
+/// The tolerance of the solution of an image's first round.
+pub fn first(asked: f64) -> f64 {
+    if GATHERS { asked.max(COARSE.min(20.0 * asked)) } else { asked }
+}
+
 /// One round of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
-    /// The tolerance that it worked to.
+    /// The tolerance that its solution was computed to.
     pub tolerance: f64,
     /// The error estimate that it came to.
     pub estimate: f64,
@@ -284,7 +294,8 @@ pub struct Round {
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let idle = before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= PASSES * asked || rounds >= ROUNDS || !last.by_visibility || idle;
-    let step = clamp(asked / last.estimate, STEPS.0, STEPS.1);
+    let least = STEPS.0.min(asked / last.tolerance);
+    let step = clamp(asked / last.estimate, least, STEPS.1);
     let growth = 1.0 / (step * step);
     let large = last.rays as f64 * growth > MOST_RAYS || last.bytes as f64 * growth > MOST_BYTES;
     let next = step * last.tolerance;

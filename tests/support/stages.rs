@@ -436,7 +436,7 @@ impl Stage<'_> {
             variance: &tables.variance[..counts.unknowns],
             reference: self.reference,
             brightest,
-            settings: policy::chains(tolerance, None, self.coupling.rays()),
+            settings: policy::chains((tolerance, tolerance), None, self.coupling.rays()),
         };
         let camera = Camera::new(camera, self.scene)?;
         let bytes = image::scratch_bytes(&camera, bands)?;

@@ -63,7 +63,7 @@ pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
     let mut memory = GeometryMemory::default();
     loop {
         let directional = case.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform));
-        let settings = Settings { tolerance: rounds.tolerance(), directional, ..Settings::default() };
+        let settings = rounds.settings(Settings { directional, ..Settings::default() });
         let geometry = host.geometry(&mut memory, &input, &settings)?;
         let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
         let mut image = host.image(&lit, &case.camera, false)?;

@@ -76,14 +76,14 @@ fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
     let mut rounds = Rounds::new(scene.tolerance);
     let mut memory = GeometryMemory::default();
     loop {
-        let settings = Settings {
-            tolerance: rounds.tolerance(),
+        let settings = rounds.settings(Settings {
             max_bounces: scene.max_bounces,
             reference_radiance: scene.reference_radiance.clone(),
             all_irradiances: job.facets,
             // A uniform sky is told by closure, without the directions in which it is seen.
             directional: scene.sky.as_ref().is_some_and(|sky| !matches!(sky.model, Model::Uniform)),
-        };
+            ..Settings::default()
+        });
         progress.stage("coupling");
         let geometry = host.geometry(&mut memory, &scene_input(job, &materials), &settings)?;
         progress.stage("light");

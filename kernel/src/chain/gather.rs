@@ -16,7 +16,7 @@ use crate::qmc::{Sequence, cosine_direction, hash2};
 use crate::scene::MAX_BANDS;
 
 /// Where the stack and memory are small nothing is gathered.
-pub(super) const GATHERS: bool = cfg!(feature = "std");
+pub(crate) const GATHERS: bool = cfg!(feature = "std");
 
 /// Bands for which there is room.
 const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
@@ -139,7 +139,7 @@ impl Gathered {
 
 /// Rays that settle what arrives at a point to an irradiance over pi of `tolerance` where half of a hemisphere is bright.
 pub(super) fn usual_rays(tolerance: f64) -> f64 {
-    pow(0.45 / tolerance, 1.5)
+    pow(0.8 / tolerance, 4.0 / 3.0)
 }
 
 /// The point of which is asked what arrives there.

@@ -1,10 +1,10 @@
 //! Images that come out worse than asked are computed again, more finely.
 
-use super::{Rays, Report, Seconds};
+use super::{Rays, Report, Seconds, Settings};
 use crate::policy::{self, Limit, Round};
 
-/// The rounds of one image. Each computes geometry, light and image to [`Rounds::tolerance`], and asks
-/// [`Rounds::again`] whether there is to be another.
+/// The rounds of one image. Each computes geometry, light and image by [`Rounds::settings`], and asks
+/// [`Rounds::again`] whether there is to be another. Images of little tolerance begin with a coarser solution.
 ///
 /// ```
 /// # use blik_kernel::{camera::*, host::*, scene::*, sky::*};
@@ -18,7 +18,7 @@ use crate::policy::{self, Limit, Round};
 /// let mut rounds = Rounds::new(2e-3);
 /// let mut memory = GeometryMemory::default();
 /// let image = loop {
-///     let settings = Settings { tolerance: rounds.tolerance(), ..Settings::default() };
+///     let settings = rounds.settings(Settings::default());
 ///     let geometry = host.geometry(&mut memory, &input, &settings)?;
 ///     let lit = host.light(&geometry, Some(&sky), None)?;
 ///     let mut image = host.image(&lit, &camera, false)?;
@@ -43,12 +43,13 @@ impl Rounds {
     /// Rounds of an image whose error is to be `tolerance`.
     pub fn new(tolerance: f64) -> Rounds {
         let (seconds, rays) = (Seconds::default(), Rays::default());
-        Rounds { asked: tolerance, tolerance, done: 0, last: None, seconds, rays }
+        let first = policy::first(tolerance);
+        Rounds { asked: tolerance, tolerance: first, done: 0, last: None, seconds, rays }
     }
 
-    /// What the present round is to be computed to.
-    pub fn tolerance(&self) -> f64 {
-        self.tolerance
+    /// What the present round is to be computed by: `settings` but for their tolerances.
+    pub fn settings(&self, settings: Settings) -> Settings {
+        Settings { tolerance: self.tolerance, image_tolerance: Some(self.asked), ..settings }
     }
 
     /// Whether another round is wanted after one with this report. The report becomes that of all rounds, against the
