@@ -251,6 +251,25 @@ fn a_pixel_is_the_mean_of_its_square() {
     assert!(centre > 10.0 * area, "{centre}: edges matter in this view");
 }
 
+#[test]
+fn a_strip_between_the_centres_of_pixels_is_seen() {
+    // a shining strip of 0.6 pixels across the image, so little off its rows that it passes between twenty centres at a time
+    let n = 40;
+    let mut mesh = Mesh::default();
+    mesh.rectangle(dvec3(-3.0, -3.0, 0.0), DVec3::X * 6.0, DVec3::Y * 6.0, 1, 0);
+    let (along, across) = (dvec3(1.6, 0.04, 0.0), DVec3::Y * 0.03 / 0.8);
+    mesh.rectangle(dvec3(-0.8, -0.02, 1e-4), along, across, 1, 1);
+    let materials = [Material::new(0.5, 0.0), Material::new(0.0, 0.0).emitting(1.0)];
+    let case = Case::new(mesh, &materials).sky(SkyOf::uniform(1));
+    let camera =
+        CameraInput { sampling: Sampling::Area, ..orthographic([0.0, -3.0, 4.0], [0.0, 0.0, 0.0], 2.0, n) };
+    let beyond: f64 = pixels(&case, &camera).iter().map(|l| l - 0.5).sum();
+    // the strip is seen at a cosine of 0.8; a pixel's side is 0.05
+    let exact = 0.5 * along.cross(across).length() * 0.8 / (0.05 * 0.05);
+    // each of some fifty pixels may be off by the tolerance, and those that the strip does not meet by what shades the floor
+    assert!((beyond / exact - 1.0).abs() < 0.05, "{beyond} of {exact}");
+}
+
 // 8: quadratures across the horizon's step
 
 #[test]

@@ -6,7 +6,7 @@ mod gather;
 mod outlook;
 mod sunlight;
 
-use crowd::CROWDED;
+use crowd::{CROWDED, Surroundings};
 pub(crate) use gather::GATHERS;
 use gather::{Gathered, Spot};
 pub(crate) use outlook::{Outlook, Way};
@@ -650,7 +650,9 @@ impl Solved<'_> {
         }
         let mut variance = f64::from(self.variance.at(unknown));
         let mut correction: &[f64] = &[];
-        if leg.gathered.is_some() && self.is_crowded(surface, unknown, leg.far) {
+        if let Some(gathered) = leg.gathered.as_deref_mut()
+            && self.is_crowded(surface, unknown, leg.far, &mut gathered.surroundings)
+        {
             variance = variance.max(CROWDED * CROWDED);
         }
         if self.wants_rays(surface, weight, variance)

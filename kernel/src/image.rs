@@ -9,7 +9,7 @@ use crate::camera::{Camera, Sampling};
 use crate::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::error::{Error, Field};
 use crate::index::{Index, IndexMut, copy, pieces};
-use crate::math::{clamp, floor, narrow, pow, sqrt};
+use crate::math::{clamp, fabs, floor, narrow, pow, sqrt};
 use crate::qmc::{Sequence, hash2};
 use crate::raster::{Items, NOTHING, UNSURE};
 use crate::ray::{Hit, Line, Ray};
@@ -182,6 +182,7 @@ pub fn rows(
     let lines = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
     let work = arena.take::<f64>(work(bands))?;
     let board = arena.take::<Board>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+    board.work.gathered.start();
     let ways = arena.take::<Way>(Outlook::ROOM)?;
     let items = Items::new(&mut arena, width, DRAWN)?;
     let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
@@ -323,20 +324,52 @@ impl<'a> Painter<'a, '_> {
             self.line(row + 1, -1..columns + 1, |this, own, path| this.keep(row + 1, own, path));
             let goal = self.goal(row, columns);
             self.find_thin(row, columns);
+            let index = |j: isize| (row - first) as usize * columns as usize + j as usize;
+            let mut beside = false;
             for j in 0..columns {
                 let at = self.slot(row, j);
                 let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(at + self.stride - NOTES + i));
                 self.note(object > 0.0, variance, tail);
-                let index = (row - first) as usize * columns as usize + j as usize;
+                if self.is_flat(at) && !beside {
+                    self.write(target, index(j), at);
+                    continue;
+                }
+                beside = self.settle(target, index(j), (row, j), goal);
+                let (mut more, mut back) = (beside, j - 1);
+                while more && back >= 0 && self.is_flat(self.slot(row, back)) {
+                    more = self.settle(target, index(back), (row, back), goal);
+                    back -= 1;
+                }
+            }
+            for j in 0..columns {
+                let at = self.slot(row, j);
                 if self.is_flat(at) {
-                    self.write(target, index, at);
                     self.err(at, 0.2 * self.lines.at(at + self.stride - 1));
-                } else {
-                    let error = self.refine(target, index, row, j, goal);
-                    self.err(at, error);
                 }
             }
         }
+    }
+
+    /// Samples a pixel; whether it shows what its centre does not, so that those to its left and right may, too: a strip
+    /// passes between the centres of many pixels.
+    fn settle(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        goal: f64,
+    ) -> bool {
+        let at = self.slot(row, column);
+        let error = self.refine(target, index, row, column, goal);
+        self.err(at, error);
+        // flat no more
+        self.lines.set(at + self.stride - 1, f64::INFINITY);
+        let bands = self.solved.shape.bands;
+        let values = target.image.part(index * bands..(index + 1) * bands);
+        self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
+            let centre = [0, 1, 2].map(|term| self.lines.at(at + term * bands + band)).iter().sum::<f64>();
+            fabs(f64::from(*value) - centre) > FLAT * self.solved.settings.tolerance * reference
+        })
     }
 
     /// Finds the unevenness about all pixels of a row, and the error that each of its uneven ones may have for the

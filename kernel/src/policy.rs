@@ -294,10 +294,9 @@ pub struct Round {
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let idle = before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= PASSES * asked || rounds >= ROUNDS || !last.by_visibility || idle;
-    let least = STEPS.0.min(asked / last.tolerance);
-    let step = clamp(asked / last.estimate, least, STEPS.1);
-    let growth = 1.0 / (step * step);
-    let large = last.rays as f64 * growth > MOST_RAYS || last.bytes as f64 * growth > MOST_BYTES;
+    let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
+    let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
+    let step = (asked / last.estimate).min(STEPS.1).max(least);
     let next = step * last.tolerance;
-    (!done && !large && check_tolerance(next).is_ok()).then_some(next)
+    (!done && step <= STEPS.1 && check_tolerance(next).is_ok()).then_some(next)
 }

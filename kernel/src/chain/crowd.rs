@@ -3,8 +3,9 @@
 
 use super::Solved;
 use super::gather::GATHERS;
+use crate::arena::plain_table;
 use crate::bvh::Half;
-use crate::index::Index;
+use crate::index::{Index, IndexMut};
 use crate::math::{Vec3, frame, sqrt};
 use crate::mirror::Surface;
 
@@ -21,43 +22,103 @@ const NEAR: f64 = 5.0;
 /// Facets that are looked at: where there are more, they are parts of larger things.
 const MOST: u32 = 64;
 
+/// Elements that are remembered.
+const KEPT: usize = if GATHERS { 64 } else { 0 };
+
+plain_table! {
+    /// What is known of the elements that were asked about latest.
+    pub struct Surroundings {
+        /// Each at its number's place: twice the unknown's number and 2, and 1 where small facets may stand near it.
+        pub known: [u64; KEPT],
+    }
+}
+
+impl Surroundings {
+    /// Nothing is known.
+    pub const ZERO: Surroundings = Surroundings { known: [0; KEPT] };
+}
+
 impl Solved<'_> {
     /// Whether facets far smaller than its element stand near a point that a ray met after so long a way.
     #[inline]
-    pub(super) fn is_crowded(&self, surface: &Surface, unknown: usize, far: f64) -> bool {
+    pub(super) fn is_crowded(
+        &self,
+        surface: &Surface,
+        unknown: usize,
+        far: f64,
+        known: &mut Surroundings,
+    ) -> bool {
         let (area, per_square) = self.settings.pixel;
         let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
         GATHERS
             && element > PIXELS * (area + per_square * far * far)
             && self.bvh.is_own()
-            && self.small_near(surface, sqrt(element))
+            && self.element_is_crowded(surface, unknown, sqrt(element), known)
+            && self.small_near(&Near { normal: surface.normal, size: sqrt(element) }, &[surface.point; 3])
     }
 
+    /// The same of any of its points, or because there are too many facets to tell.
+    #[inline]
+    fn element_is_crowded(
+        &self,
+        surface: &Surface,
+        unknown: usize,
+        size: f64,
+        known: &mut Surroundings,
+    ) -> bool {
+        let (place, name) = (unknown % KEPT.max(1), 2 * (unknown as u64 + 1));
+        if known.known.at(place) & !1 != name {
+            let corners = self.elements.corners(self.scene, unknown / self.scene.sides());
+            let crowded = self.small_near(&Near { normal: surface.normal, size }, &corners);
+            known.known.set(place, name | u64::from(crowded));
+        }
+        known.known.at(place) & 1 != 0
+    }
+
+    /// Whether small facets stand before the points of a triangle, or of a point alone.
     #[inline(never)]
-    fn small_near(&self, surface: &Surface, size: f64) -> bool {
-        let (point, normal) = (surface.point, surface.normal);
-        let (x, y) = frame(normal);
-        let reach = NEAR * SMALL * size;
-        let half = |normal: Vec3, below: f64| Half { normal, height: point.dot(normal) - below };
+    fn small_near(&self, near: &Near, corners: &[Vec3; 3]) -> bool {
+        let (x, y) = frame(near.normal);
+        let reach = NEAR * SMALL * near.size;
+        let half = |normal: Vec3, below: f64| {
+            let least = corners.iter().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
+            Half { normal, height: least - below }
+        };
         let halves = [
             half(x, reach),
             half(-x, reach),
             half(y, reach),
             half(-y, reach),
-            half(normal, 0.0),
-            half(-normal, reach),
+            half(near.normal, 0.0),
+            half(-near.normal, reach),
         ];
+        let alone = corners[0] == corners[1];
         let (mut found, mut seen) = (false, 0);
         self.bvh.within(&halves, |facet: u32| {
-            let Some((corners, _)) = self.bvh.corners(facet) else { return true };
-            let [a, b, c] = corners.map(|corner| corner - point);
-            let own = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
-            let distance = (a + b + c).length_squared() / 9.0;
-            let above = [a, b, c].iter().any(|corner| corner.dot(normal) > 0.01 * sqrt(own));
-            found = own < SMALL * SMALL * size * size && distance < NEAR * NEAR * own && above;
+            let Some((own, _)) = self.bvh.corners(facet) else { return true };
+            found = near.is_small(&own, corners[0], alone);
             seen += 1;
             !found && seen < MOST
         });
-        found
+        found || !alone && seen >= MOST
+    }
+}
+
+/// An element's side.
+struct Near {
+    normal: Vec3,
+    /// Root of its area.
+    size: f64,
+}
+
+impl Near {
+    /// Whether a facet is small beside it, stands before its plane and, where it is a point that counts, near.
+    fn is_small(&self, facet: &[Vec3; 3], point: Vec3, alone: bool) -> bool {
+        let [a, b, c] = facet.map(|corner| corner - point);
+        let own = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
+        let distance = (a + b + c).length_squared() / 9.0;
+        let above = [a, b, c].iter().any(|corner| corner.dot(self.normal) > 0.01 * sqrt(own));
+        let near = !alone || distance < NEAR * NEAR * own;
+        own < SMALL * SMALL * self.size * self.size && near && above
     }
 }

@@ -6,7 +6,7 @@
 //! deviation s: about s n^-3/4. Where facets hide little of the sky, its irradiance is the exact one of the plane less what
 //! they hide.
 
-use super::{How, Leg, Path, Sample, Solved, Terms, linear};
+use super::{How, Leg, Path, Sample, Solved, Surroundings, Terms, linear};
 use crate::arena::plain_table;
 use crate::element::Local;
 use crate::index::{Index, IndexMut};
@@ -46,7 +46,7 @@ const ALIKE: f64 = 2.0;
 const KEPT: usize = if GATHERS { 8 } else { 0 };
 
 plain_table! {
-    /// What rays from points have brought, of any content; [`Gathered::forget`] comes first.
+    /// What rays from points have brought, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
     pub struct Gathered {
         /// Of the latest ray.
         pub terms: [Terms; GATHERS as usize],
@@ -68,6 +68,8 @@ plain_table! {
         pub carried: f64,
         /// How many there are.
         pub count: u64,
+        /// What stands about the latest element; none at first.
+        pub surroundings: Surroundings,
     }
 }
 
@@ -84,7 +86,13 @@ impl Gathered {
         unknowns: [0; KEPT],
         carried: 0.0,
         count: 0,
+        surroundings: Surroundings::ZERO,
     };
+
+    /// Another image begins.
+    pub(crate) fn start(&mut self) {
+        self.surroundings = Surroundings::ZERO;
+    }
 
     /// Another pixel begins.
     #[inline]
