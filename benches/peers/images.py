@@ -1,5 +1,6 @@
 """Seconds to an image of equal error: Mitsuba 3 and Radiance on the same meshes and camera rays."""
 
+import copy
 import csv
 import math
 import os
@@ -13,6 +14,9 @@ import numpy as np
 SCENES = ["airplane_d0.1_s0.3_a", "corner_d0.4_s0_a"]
 GOALS = {"airplane_d0.1_s0.3_a": [1.35e-3, 3e-4, 1e-4], "corner_d0.4_s0_a": [2e-3, 5e-4]}
 TOLERANCES = [2e-2, 1e-2, 5e-3, 3e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4]
+# Pixels of references of our own where the given ones do not show an error, and samples of each: a standard error of some
+# 2.5e-5 on the aircraft
+FINE_PIXELS, FINE_SAMPLES = 2048, 1 << 20
 # no finer run of Blik after one of so many processor seconds: the next takes several times as long
 LONGEST = 30.0
 
@@ -42,6 +46,7 @@ class Scene:
         rows = csv.DictReader((folder / "index.csv").open())
         errors = {r["id"]: float(r["reference_standard_error"]) for r in rows if r["kind"] == "image"}
         self.noise = errors[name]
+        self.fine = None
         self.rays(camera)
 
     def rays(self, camera):
@@ -58,12 +63,35 @@ class Scene:
         self.origins = eye + x[:, None] * right + y[:, None] * up
 
     def eps(self, values):
-        """eps_c of an image given by its object pixels, or None where the reference's noise hides it."""
+        """eps_c of an image given by its object pixels, or None where the references' noise hides it."""
         image = np.zeros(self.hit.shape)
         image[self.hit] = values
-        eps2 = np.mean((image - self.reference)[self.counted] ** 2)
-        corrected = math.sqrt(max(0.0, eps2 - self.noise**2))
-        return corrected if corrected >= 0.5 * self.noise else None
+        error = shown((image - self.reference)[self.counted], self.noise)
+        if error is None and self.fine:
+            pixels, reference, noise = self.fine
+            error = shown(np.asarray(values)[pixels] - reference, noise)
+        return error
+
+    def refine(self, work):
+        """Makes a finer reference of some pixels, with Mitsuba, and keeps it in the work folder."""
+        file = work / f"{self.name}_fine.npz"
+        if not file.exists():
+            # spread over the object; numbers in the order of its pixels
+            counted = np.flatnonzero(self.counted[self.hit])
+            pixels = np.unique(counted[np.linspace(0, len(counted) - 1, FINE_PIXELS).astype(int)])
+            subset = copy.copy(self)
+            subset.origins = self.origins[pixels]
+            passes = Mitsuba(subset).passes(FINE_SAMPLES)
+            error2 = np.mean(np.var(passes, axis=0, ddof=1)) / len(passes)
+            np.savez(file, pixels=pixels, values=np.mean(passes, axis=0), noise=math.sqrt(error2))
+        kept = np.load(file)
+        self.fine = kept["pixels"], kept["values"], float(kept["noise"])
+
+
+def shown(differences, noise):
+    """Rms of differences without the reference's noise, or None where that hides it."""
+    corrected = math.sqrt(max(0.0, np.mean(differences**2) - noise**2))
+    return corrected if corrected >= 0.5 * noise else None
 
 
 def processor():
@@ -102,15 +130,22 @@ class Mitsuba:
 
     def image(self, samples):
         """Seconds, the object's pixels and processor seconds; the scene is in memory. Samples: a square number."""
-        pixels = len(self.scene.origins)
-        # so many rays at once fit into the memory of a small machine
-        side = math.isqrt(min(samples, (1 << 23) // pixels))
         start, before = time.perf_counter(), processor()
-        total, passes = 0.0, round(samples / side**2)
-        for _ in range(passes):
+        total, count = 0.0, 0
+        for values in self.in_passes(samples):
+            total, count = total + values, count + 1
+        return time.perf_counter() - start, total / count, processor() - before
+
+    def passes(self, samples):
+        """The pixels of images that have so many samples together."""
+        return list(self.in_passes(samples))
+
+    def in_passes(self, samples):
+        # so many rays at once fit into the memory of a small machine
+        side = math.isqrt(min(samples, (1 << 23) // len(self.scene.origins)))
+        for _ in range(round(samples / side**2)):
             self.seed += 1
-            total = total + np.array(self.paths(side**2, self.seed))
-        return time.perf_counter() - start, total / passes, processor() - before
+            yield np.array(self.paths(side**2, self.seed))
 
     def paths(self, samples, seed):
         dr, mi = self.dr, self.mi
@@ -243,6 +278,8 @@ def compare(blik, found, options):
     tables = {"Mitsuba: samples": [], "Radiance: -ad": []}
     for name in filter(found.get, SCENES):
         scene = Scene(found[name], name)
+        if min(GOALS[name]) < 0.5 * scene.noise:
+            scene.refine(options.work)
         runs = blik_runs(blik, scene, options)
         tables["Mitsuba: samples"] += mitsuba_rows(blik, scene, Mitsuba(scene), runs, options)
         tables["Radiance: -ad"] += radiance_rows(scene, runs, options, options.work)

@@ -259,7 +259,7 @@ const PASSES: f64 = 1.75;
 const ROUNDS: u32 = 3;
 const STEPS: (f64, f64) = (0.4, 0.7);
 
-/// A round that leaves so much of the last one's estimate: more rounds would, too.
+/// A round that leaves so much of the last one's estimate: more rounds would, too, once they are as fine as asked.
 const IDLE: f64 = 0.8;
 
 /// The most rays and bytes that another round may be expected to take.
@@ -292,7 +292,7 @@ pub struct Round {
 /// The tolerance of another round for an image of which `asked` was wanted, after the round `last`, number `rounds`, and
 /// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
-    let idle = before.is_some_and(|before| last.estimate > IDLE * before.estimate);
+    let idle = last.tolerance <= asked && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= PASSES * asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
     let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
