@@ -78,30 +78,33 @@ fn beside_a_black_wall_the_sky_is_what_the_wall_leaves() {
 #[test]
 fn views_from_near_show_what_stands_there() {
     let (tolerance, size) = (1e-2, 0.01);
-    let mut mesh = Mesh::default();
-    mesh.rectangle(DVec3::new(-1.0, -1.0, 0.0), DVec3::X * 2.0, DVec3::Y * 2.0, 1, 0);
-    let cube = scenes::cube_outside().mapped(|v| (v - DVec3::new(0.5, 0.5, 0.0)) * size);
-    let mesh = mesh.joined(&cube.translated([0.2, -0.3, 0.0]).of_material(1));
-    let materials = [Material::spectral(&[RHO], &[0.0]), Material::spectral(&[0.0], &[0.0])];
-    Case::new(mesh, &materials).sky(SkyOf::uniform(1)).with_lit(1, &within(tolerance), |_, lit| {
-        let mut near = lit.solved();
-        // parallel rays through pixels of a twentieth of the cube
-        near.settings.pixel = ((size / 20.0) * (size / 20.0), 0.0);
-        let middle = Vec3::new(0.2, -0.3, 0.0);
-        let wall = [[-0.5, 0.0], [-0.5, 1.0], [0.5, 1.0], [0.5, 0.0]];
-        let mut worst = [0.0f64; 2];
-        for gap in [0.02, 0.1, 0.3, 0.7, 1.5] {
-            // beside the middle of one wall: no other shows
-            let place = middle + Vec3::new(0.1, 0.5 + gap, 0.0) * size;
-            let corners = wall.map(|[x, z]| middle + Vec3::new(x, 0.5, z) * size);
-            let exact = RHO * (1.0 - point_to_polygon(place, Vec3::Z, &corners));
-            let errors = [&near, &lit.solved()].map(|solved| (radiance(solved, place) - exact).abs());
-            worst = [worst[0].max(errors[0]), worst[1].max(errors[1])];
-        }
-        // half the tolerance is gone for
-        assert!(worst[0] < tolerance, "{worst:?}");
-        assert!(worst[1] > 10.0 * tolerance, "its element alone would do here: {worst:?}");
-    });
+    // of twelve facets, and of more than are looked at one by one
+    for cuts in [0, 4] {
+        let mut mesh = Mesh::default();
+        mesh.rectangle(DVec3::new(-1.0, -1.0, 0.0), DVec3::X * 2.0, DVec3::Y * 2.0, 1, 0);
+        let cube = scenes::cube_outside().subdivided(cuts).mapped(|v| (v - DVec3::new(0.5, 0.5, 0.0)) * size);
+        let mesh = mesh.joined(&cube.translated([0.2, -0.3, 0.0]).of_material(1));
+        let materials = [Material::spectral(&[RHO], &[0.0]), Material::spectral(&[0.0], &[0.0])];
+        Case::new(mesh, &materials).sky(SkyOf::uniform(1)).with_lit(1, &within(tolerance), |_, lit| {
+            let mut near = lit.solved();
+            // parallel rays through pixels of a twentieth of the cube
+            near.settings.pixel = ((size / 20.0) * (size / 20.0), 0.0);
+            let middle = Vec3::new(0.2, -0.3, 0.0);
+            let wall = [[-0.5, 0.0], [-0.5, 1.0], [0.5, 1.0], [0.5, 0.0]];
+            let mut worst = [0.0f64; 2];
+            for gap in [0.02, 0.1, 0.3, 0.7, 1.5] {
+                // beside the middle of one wall: no other shows
+                let place = middle + Vec3::new(0.1, 0.5 + gap, 0.0) * size;
+                let corners = wall.map(|[x, z]| middle + Vec3::new(x, 0.5, z) * size);
+                let exact = RHO * (1.0 - point_to_polygon(place, Vec3::Z, &corners));
+                let errors = [&near, &lit.solved()].map(|solved| (radiance(solved, place) - exact).abs());
+                worst = [worst[0].max(errors[0]), worst[1].max(errors[1])];
+            }
+            // half the tolerance is gone for
+            assert!(worst[0] < tolerance, "{cuts} cuts: {worst:?}");
+            assert!(worst[1] > 10.0 * tolerance, "its element alone would do here: {worst:?}");
+        });
+    }
 }
 
 /// A solution that is ten times as coarse as the image is to be, and rays from the image's points.

@@ -53,6 +53,8 @@ fn run(reference: &Reference) -> Outcome {
         let seconds = start.elapsed().as_secs_f64();
         let (counted, sound) = (reference.counted(), reference.sound(&scene, &camera));
         let left_out = metric::pixels(&counted) - metric::pixels(&sound);
+        // a hundredth at most: else the references show too little
+        assert!(left_out * 100 <= metric::pixels(&counted), "{}: {left_out} left out", reference.id);
         let [all, eps] = [counted, sound].map(|pixels| {
             let eps = metric::eps(&image.pixels, &reference.image().values, &pixels, &[1.0]);
             metric::corrected(metric::worst(&eps).1, reference.image_standard_error)

@@ -107,10 +107,11 @@ pub struct blik_settings {
     /// as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
     /// goes on at a steady number of rays a second.
     pub ray_budget: u64,
-    /// Where it is above 0 and below the tolerance, that is the solution's alone, and this the wanted error of images: rays
-    /// from the points that an image shows find what a solution lacks that is there sooner. For few images of little error,
-    /// which take longer each; default 0: the tolerance. No such rays are sent without the standard library, nor where
-    /// `max_bounces` is given or lobes throw sunlight: the report's error estimate tells.
+    /// 0 (default), or 1e-6 to 0.1. Where it is above 0 and below the tolerance, that is the solution's alone, and this the
+    /// wanted error of images: rays from the points that an image shows find what a solution lacks that is there sooner. For
+    /// few images of little error, which take longer each. No such rays are sent without the standard library, nor where
+    /// `max_bounces` is given, or lobes or curved mirrors throw sunlight: the report's error estimate tells. Baked blocks do
+    /// not keep it.
     pub image_tolerance: f64,
 }
 

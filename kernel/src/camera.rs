@@ -50,6 +50,9 @@ pub struct CameraInput {
     pub sampling: Sampling,
 }
 
+/// A facet is near where the square of its distance is below so many of that of its size.
+const NEAR: f64 = 4.0;
+
 /// The most pixels along either side of an image.
 pub const MAX_RESOLUTION: usize = 1 << 16;
 
@@ -167,14 +170,20 @@ impl Camera {
         4.0 * self.half.0 * self.half.1 / (self.columns as f64 * self.rows as f64)
     }
 
-    /// Pixels that the fronts of the facets fill if none hides another; those around an eye count all.
+    /// Pixels that the fronts of the facets fill if none hides another; where the eye is near to one, for its size, that is
+    /// not told, and infinite.
     pub(crate) fn most_pixels(&self, scene: &Scene<'_>) -> f64 {
         let of = |facet: usize| {
             let ([a, b, c], normal) = (scene.corners().at(facet), scene.normals().at(facet));
-            let from = if self.parallel { -self.forward } else { self.eye - (a + b + c) / 3.0 };
+            let middle = (a + b + c) / 3.0;
+            let from = if self.parallel { -self.forward } else { self.eye - middle };
             let cosine = from.dot(normal);
             let seen = if scene.sides() == 2 { fabs(cosine) } else { cosine.max(0.0) };
             let distance = if self.parallel { 1.0 } else { sqrt(from.length_squared()) };
+            let size = [a, b, c].iter().map(|corner| (*corner - middle).length_squared()).fold(0.0, f64::max);
+            if !self.parallel && seen > 0.0 && distance * distance < NEAR * size {
+                return f64::INFINITY;
+            }
             scene.areas().at(facet) * seen / (distance * distance * distance).max(f64::MIN_POSITIVE)
         };
         (0..scene.facets()).map(of).sum::<f64>() / self.pixel_area()

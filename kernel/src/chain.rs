@@ -39,10 +39,10 @@ pub struct ChainSettings {
     /// Where more than so many tolerances of error are expected of an element, rays from the point itself find what arrives
     /// there.
     pub gather: f64,
-    /// Rays that an image may take for that.
+    /// Where mending all pixels is expected to take at most so many rays, all are.
     pub rays: u64,
-    /// Whether the solution is coarser than the tolerance.
-    pub coarse: bool,
+    /// Tolerance of the solution.
+    pub solution: f64,
     /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
     pub pixel: (f64, f64),
 }
@@ -54,19 +54,16 @@ impl ChainSettings {
     /// The same for an image of so many pixels of facets that reflect `diffuse` at most: where the rays suffice for all of
     /// them, all but the best elements are mended.
     pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
-        let mut pixels = (camera.columns() * camera.rows()) as f64;
-        if self.coarse {
-            pixels = pixels.min(camera.most_pixels(scene));
-        }
-        let rays =
-            pixels * gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));
-        let gather = if rays <= self.rays as f64 {
+        let all = camera.columns() * camera.rows();
+        let each = gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));
+        let affords = |pixels: f64| pixels * each <= self.rays as f64;
+        // counting them takes a look at every facet
+        let counts = GATHERS && self.solution > self.tolerance && scene.facets() <= all;
+        let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
             GATHER_ALL
-        } else if self.coarse {
-            // most of it would have to be mended: a finer solution costs less
-            f64::INFINITY
         } else {
-            self.gather
+            // most of it would have to be mended, for which a finer solution costs less: what a solution leaves at worst
+            self.gather * (self.solution / self.tolerance).max(1.0)
         };
         let area = camera.pixel_area();
         ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }

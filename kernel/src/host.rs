@@ -46,9 +46,10 @@ use std::vec::Vec;
 pub struct Settings {
     /// The wanted error of the image, eq. 16, relative to the reference radiance: 1e-6 to 0.1.
     pub tolerance: f64,
-    /// Where it is less than the tolerance, that is the solution's alone, and this the image's: rays from the points that it
-    /// shows find what a solution lacks that is there sooner. For few images of little error, which take longer each;
-    /// `None`: the tolerance.
+    /// 1e-6 to 0.1. Where it is less than the tolerance, that is the solution's alone, and this the image's: rays from the
+    /// points that it shows find what a solution lacks that is there sooner. For few images of little error, which take longer
+    /// each; `None`: the tolerance. There are no such rays where reflections are counted, or where lobes or curved mirrors
+    /// throw sunlight; the error estimate tells.
     pub image_tolerance: Option<f64>,
     /// Light reflected more often does not count; `None`: by tolerance.
     pub max_bounces: Option<u32>,
@@ -185,7 +186,9 @@ impl Host {
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
         policy::check_tolerance(settings.tolerance)?;
-        policy::check_tolerance(settings.of_image())?;
+        if let Some(image) = settings.image_tolerance {
+            policy::check_tolerance(image)?;
+        }
         if let Some(reference) = &settings.reference_radiance {
             light::check_reference(reference, input.bands)?;
         }

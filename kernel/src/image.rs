@@ -368,7 +368,8 @@ impl<'a> Painter<'a, '_> {
         let values = target.image.part(index * bands..(index + 1) * bands);
         self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
             let centre = [0, 1, 2].map(|term| self.lines.at(at + term * bands + band)).iter().sum::<f64>();
-            fabs(f64::from(*value) - centre) > FLAT * self.solved.settings.tolerance * reference
+            fabs(f64::from(*value) - f64::from(narrow(centre)))
+                > FLAT * self.solved.settings.tolerance * reference
         })
     }
 

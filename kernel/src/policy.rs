@@ -85,7 +85,7 @@ pub fn chains((tolerance, solution): (f64, f64), max_bounces: Option<u32>, rays:
         sky_error: sky_accuracy(tolerance),
         gather: GATHER,
         rays: (rays as f64 * 4.0 * growth) as u64,
-        coarse: solution > tolerance,
+        solution,
         pixel: (f64::INFINITY, 0.0),
     }
 }

@@ -19,8 +19,10 @@ const PIXELS: f64 = 16.0;
 const SMALL: f64 = 0.125;
 const NEAR: f64 = 5.0;
 
-/// Facets that are looked at: where there are more, they are parts of larger things.
+/// Facets that are looked at. Where there are more, they count as small things if the element fills so many pixels that the
+/// view is of its surroundings, else as parts of larger ones.
 const MOST: u32 = 64;
+const LARGE: f64 = 256.0;
 
 /// Elements that are remembered.
 const KEPT: usize = if GATHERS { 64 } else { 0 };
@@ -50,26 +52,22 @@ impl Solved<'_> {
     ) -> bool {
         let (area, per_square) = self.settings.pixel;
         let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
+        let pixel = area + per_square * far * far;
+        let near = |many: bool| Near { normal: surface.normal, size: sqrt(element), many };
         GATHERS
-            && element > PIXELS * (area + per_square * far * far)
+            && element > PIXELS * pixel
             && self.bvh.is_own()
-            && self.element_is_crowded(surface, unknown, sqrt(element), known)
-            && self.small_near(&Near { normal: surface.normal, size: sqrt(element) }, &[surface.point; 3])
+            && self.element_is_crowded(unknown, &near(true), known)
+            && self.small_near(&near(element > LARGE * pixel), &[surface.point; 3])
     }
 
     /// The same of any of its points, or because there are too many facets to tell.
     #[inline]
-    fn element_is_crowded(
-        &self,
-        surface: &Surface,
-        unknown: usize,
-        size: f64,
-        known: &mut Surroundings,
-    ) -> bool {
+    fn element_is_crowded(&self, unknown: usize, near: &Near, known: &mut Surroundings) -> bool {
         let (place, name) = (unknown % KEPT.max(1), 2 * (unknown as u64 + 1));
         if known.known.at(place) & !1 != name {
             let corners = self.elements.corners(self.scene, unknown / self.scene.sides());
-            let crowded = self.small_near(&Near { normal: surface.normal, size }, &corners);
+            let crowded = self.small_near(near, &corners);
             known.known.set(place, name | u64::from(crowded));
         }
         known.known.at(place) & 1 != 0
@@ -100,7 +98,7 @@ impl Solved<'_> {
             seen += 1;
             !found && seen < MOST
         });
-        found || !alone && seen >= MOST
+        found || near.many && seen >= MOST
     }
 }
 
@@ -109,6 +107,8 @@ struct Near {
     normal: Vec3,
     /// Root of its area.
     size: f64,
+    /// Whether many facets count as small ones.
+    many: bool,
 }
 
 impl Near {

@@ -4,7 +4,8 @@ use super::{Rays, Report, Seconds, Settings};
 use crate::policy::{self, Limit, Round};
 
 /// The rounds of one image. Each computes geometry, light and image by [`Rounds::settings`], and asks
-/// [`Rounds::again`] whether there is to be another. Images of little tolerance begin with a coarser solution.
+/// [`Rounds::again`] whether there is to be another. Images of little tolerance begin with a coarser solution. The last
+/// round's image need not be the one of the least estimate, where even a finer one brings nothing.
 ///
 /// ```
 /// # use blik_kernel::{camera::*, host::*, scene::*, sky::*};
@@ -48,7 +49,11 @@ impl Rounds {
     }
 
     /// What the present round is to be computed by: `settings` but for their tolerances.
-    pub fn settings(&self, settings: Settings) -> Settings {
+    pub fn settings(&mut self, settings: Settings) -> Settings {
+        if self.done == 0 && policy::shape(settings.max_bounces, 1).levels > 1 {
+            // no rays from points, which would mend a coarse solution
+            self.tolerance = self.asked;
+        }
         Settings { tolerance: self.tolerance, image_tolerance: Some(self.asked), ..settings }
     }
 
