@@ -45,13 +45,19 @@ pub fn read(path: &Path, bands: usize) -> Outcome<Table> {
     }
 }
 
-/// The crate multiplies a file's shape without a look at its size.
+/// The crate multiplies a file's shape without a look at its size, wherever in the head it finds one: all numbers of the
+/// head together, the bytes of a value among them, are to be no more than the file's bytes.
 fn shape_fits(bytes: &[u8]) -> bool {
-    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(1 << 16)]);
-    let shape = head.split_once("shape").and_then(|(_, rest)| rest.split_once('(')?.1.split_once(')'));
-    let sizes =
-        shape.map_or("", |(inside, _)| inside).split(',').filter_map(|n| n.trim().parse::<usize>().ok());
-    sizes.into_iter().try_fold(1usize, |all, n| all.checked_mul(n)).is_some_and(|n| n <= bytes.len())
+    let length = match bytes {
+        [_, _, _, _, _, _, 1, _, a, b, ..] => usize::from(u16::from_le_bytes([*a, *b])),
+        [_, _, _, _, _, _, _, _, a, b, c, d, ..] => u32::from_le_bytes([*a, *b, *c, *d]) as usize,
+        _ => 0,
+    };
+    let start = bytes.len().min(10);
+    let head = String::from_utf8_lossy(&bytes[start..bytes.len().min(start.saturating_add(length))]);
+    let mut numbers = head.split(|c: char| !c.is_ascii_digit()).filter(|n| !n.is_empty());
+    let all = numbers.try_fold(1usize, |all, n| all.checked_mul(n.parse::<usize>().ok()?.max(1)));
+    all.is_some_and(|all| all <= bytes.len())
 }
 
 fn npy(bytes: &[u8]) -> Result<Table, String> {
