@@ -152,18 +152,25 @@ pub fn rows(
     check(out.len(), span(&range))?;
     let mut sums = [0.0; MAX_BANDS];
     let sums = sums.head_mut(bands);
+    let unseen = if is_dark(system) { 0.0 } else { UNSEEN };
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
         let near = system.stand_in(unknown, &row);
         let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
         let (unknown, row) = known.unwrap_or((unknown, row));
         row.gather(carried, sums);
         let own = differences.part(unknown * bands..(unknown + 1) * bands);
-        let unseen = UNSEEN / f64::from(row.row.rays).max(1.0);
-        let unseen = if row.row.rays > 0 { unseen * unseen } else { 0.0 };
+        let rays = f64::from(row.row.rays);
+        let unseen = if rays > 0.0 { (unseen / rays) * (unseen / rays) } else { 0.0 };
         let square = |(&[_, own], &carried): (&Own, &f64)| unseen + f64::from(own) + carried * carried;
         *out = narrow(own.iter().zip(&*sums).map(square).fold(0.0, f64::max));
     }
     Ok(())
+}
+
+/// Whether there is no light at all.
+fn is_dark(system: &System<'_>) -> bool {
+    let shines = |material: usize| system.scene.emission(material).iter().any(|l| *l > 0.0);
+    system.light.sky.is_none() && system.light.sun.is_none() && !(0..system.scene.materials()).any(shines)
 }
 
 fn check(given: usize, expected: usize) -> Result<(), Error> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{ElementDef, Property, PropertyAccess, PropertyAccessResult};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult};
 
 use super::Mesh;
 use super::builder::{Builder, Corner, Place};
@@ -134,6 +134,8 @@ pub fn read(path: &Path, bytes: &[u8]) -> Outcome<Mesh> {
                 let rows = Parser::<Face>::new().read_payload_for_element(&mut reader, element, &header);
                 faces = Some(rows.map_err(|e| fail(&e))?);
             }
+            // no bytes to read, however many it says there are
+            _ if element.properties.is_empty() && header.encoding != Encoding::Ascii => {}
             _ => {
                 let rows = Parser::<Ignored>::new().read_payload_for_element(&mut reader, element, &header);
                 rows.map_err(|e| fail(&e))?;
