@@ -254,6 +254,9 @@ pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
 /// Estimates up to so many tolerances are let pass: on the calibration's scenes they are about twice the error.
 const PASSES: f64 = 1.75;
 
+/// The same while the solution is coarser than asked: what is not mended by rays from points may be that wrong.
+const PASSES_COARSE: f64 = 1.35;
+
 /// The most rounds of one image, and the most and the least by which the tolerance falls from one to the next: half of it
 /// takes some four times as long.
 const ROUNDS: u32 = 3;
@@ -293,10 +296,14 @@ pub struct Round {
 /// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let idle = last.tolerance <= asked && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
-    let done = last.estimate <= PASSES * asked || rounds >= ROUNDS || !last.by_visibility || idle;
+    let coarse = last.tolerance > asked;
+    let passes = if coarse { PASSES_COARSE } else { PASSES };
+    let done = last.estimate <= passes * asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
     let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
-    let step = (asked / last.estimate).min(STEPS.1).max(least);
+    // closed forms are as cheap as that
+    let wanted = if coarse && last.rays == 0 { asked / last.tolerance } else { asked / last.estimate };
+    let step = wanted.min(STEPS.1).max(least);
     let next = step * last.tolerance;
     (!done && step <= STEPS.1 && check_tolerance(next).is_ok()).then_some(next)
 }
