@@ -81,7 +81,7 @@ class Scene:
             pixels = np.unique(counted[np.linspace(0, len(counted) - 1, FINE_PIXELS).astype(int)])
             subset = copy.copy(self)
             subset.origins = self.origins[pixels]
-            passes = Mitsuba(subset).passes(FINE_SAMPLES)
+            passes = list(Mitsuba(subset).passes(FINE_SAMPLES))
             error2 = np.mean(np.var(passes, axis=0, ddof=1)) / len(passes)
             np.savez(file, pixels=pixels, values=np.mean(passes, axis=0), noise=math.sqrt(error2))
         kept = np.load(file)
@@ -132,15 +132,12 @@ class Mitsuba:
         """Seconds, the object's pixels and processor seconds; the scene is in memory. Samples: a square number."""
         start, before = time.perf_counter(), processor()
         total, count = 0.0, 0
-        for values in self.in_passes(samples):
+        for values in self.passes(samples):
             total, count = total + values, count + 1
         return time.perf_counter() - start, total / count, processor() - before
 
     def passes(self, samples):
-        """The pixels of images that have so many samples together."""
-        return list(self.in_passes(samples))
-
-    def in_passes(self, samples):
+        """The pixels of one image after the other, which have so many samples together."""
         # so many rays at once fit into the memory of a small machine
         side = math.isqrt(min(samples, (1 << 23) // len(self.scene.origins)))
         for _ in range(round(samples / side**2)):

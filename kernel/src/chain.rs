@@ -51,8 +51,8 @@ pub struct ChainSettings {
 const GATHER_ALL: f64 = 0.6;
 
 impl ChainSettings {
-    /// The same for an image of so many pixels of facets that reflect `diffuse` at most: where the rays suffice for all of
-    /// them, all but the best elements are mended.
+    /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
+    /// elements are mended.
     pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
         let all = camera.columns() * camera.rows();
         let each = gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));

@@ -295,8 +295,8 @@ pub struct Round {
 /// The tolerance of another round for an image of which `asked` was wanted, after the round `last`, number `rounds`, and
 /// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
-    let idle = last.tolerance <= asked && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let coarse = last.tolerance > asked;
+    let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let passes = if coarse { PASSES_COARSE } else { PASSES };
     let done = last.estimate <= passes * asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
