@@ -121,7 +121,7 @@ pub unsafe extern "C" fn blik_get_report(
 /// much, or has had three rounds. With a null `report` it is the first round's: coarser than `asked` where that is little,
 /// since rays from the image's points find the rest; `image_tolerance` of the settings is `asked` in every round. This is
 /// what the program `render` and the Rust interface go by; an estimate of up to one and three quarters of the error asked
-/// for passes.
+/// for passes, after a round coarser than that up to 1.35.
 ///
 /// # Safety
 /// Pointers are null or valid.
