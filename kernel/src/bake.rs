@@ -9,19 +9,20 @@
 //! The byte order and the layout of numbers are those of the machine that wrote it: little-endian machines of 32 and of
 //! 64 bits read each other's blocks.
 
-use crate::arena::{ALIGNMENT, Arena, View, plain_struct};
-use crate::bvh::Bvh;
+use crate::base::arena::{ALIGNMENT, View, Writer, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::Index;
+use crate::base::simd::Isa;
 use crate::coupling::Block;
-use crate::element::Elements;
-use crate::error::Error;
-use crate::index::Index;
-use crate::light::{self, Shape};
-use crate::policy;
+use crate::coupling::element::Elements;
+use crate::radiosity::direct::Shape;
+use crate::radiosity::sun_image::{self, SunImages};
+use crate::rays::bvh::Bvh;
+use crate::scene::light;
+use crate::scene::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{MAX_BANDS, Scene};
-use crate::simd::Isa;
-use crate::sky::{Sky, SkyInput, SkyModel, SkyTable};
-use crate::sun::{Sun, SunInput};
-use crate::sun_image::{self, SunImages};
+use crate::settings;
 
 /// Version of the layout; another one is refused.
 pub const VERSION: u64 = 3;
@@ -145,25 +146,6 @@ pub struct Baked<'m> {
     pub solution: Option<Solution<'m>>,
 }
 
-/// Writes arrays one after the other, or counts their bytes.
-pub(crate) struct Writer<'o> {
-    memory: Option<&'o mut [u8]>,
-    at: usize,
-}
-
-impl Writer<'_> {
-    pub fn put<T: crate::arena::Plain>(&mut self, values: &[T]) -> Result<(), Error> {
-        let start = self.at.next_multiple_of(ALIGNMENT);
-        self.at = start.checked_add(size_of_val(values)).ok_or(Error::Block)?;
-        let Some(memory) = &mut self.memory else { return Ok(()) };
-        let given = memory.len();
-        let part = memory.get_mut(start..).ok_or(Error::BufferTooSmall { needed: self.at, given })?;
-        let to = Arena::new(part, 0)?.take::<T>(values.len())?;
-        crate::index::copy(to, values);
-        Ok(())
-    }
-}
-
 /// The words of a block mixed to one number; its own place counts as 0.
 fn checksum(bytes: &[u8]) -> u64 {
     let mut sum = 0x9e37_79b9_7f4a_7c15_u64;
@@ -178,16 +160,16 @@ fn checksum(bytes: &[u8]) -> u64 {
 /// One value for each of `bands` bands; zeros beyond what there is.
 fn put_bands(writer: &mut Writer<'_>, values: &[f64], bands: usize) -> Result<(), Error> {
     let mut all = [0.0; MAX_BANDS];
-    crate::index::copy(&mut all, values);
+    crate::base::index::copy(&mut all, values);
     writer.put(all.head(bands))
 }
 
 impl<'m> Baked<'m> {
     /// Bytes that [`Baked::write`] needs.
     pub fn bytes(&self) -> Result<usize, Error> {
-        let mut writer = Writer { memory: None, at: 0 };
+        let mut writer = Writer::counting();
         self.put(&mut writer, Head::default())?;
-        Ok(writer.at.next_multiple_of(ALIGNMENT))
+        Ok(writer.extent().next_multiple_of(ALIGNMENT))
     }
 
     /// Writes the block to `memory`, which starts on a boundary of [`ALIGNMENT`], and returns its size.
@@ -206,9 +188,9 @@ impl<'m> Baked<'m> {
             blocks: self.blocks.len() as u64,
             solved: u64::from(self.solution.is_some()),
         };
-        self.put(&mut Writer { memory: Some(&mut *memory), at: 0 }, head)?;
+        self.put(&mut Writer::new(&mut *memory), head)?;
         head.checksum = checksum(memory);
-        let mut writer = Writer { memory: Some(memory), at: 0 };
+        let mut writer = Writer::new(memory);
         writer.put(&[head])?;
         Ok(bytes)
     }
@@ -259,7 +241,7 @@ impl<'m> Baked<'m> {
         isa: Isa,
         blocks: &'m mut [Block<'m>],
     ) -> Result<Baked<'m>, Error> {
-        policy::check_tolerance(head.tolerance)?;
+        settings::check_tolerance(head.tolerance)?;
         let max_bounces = match head.max_bounces {
             u64::MAX => None,
             most => Some(u32::try_from(most).map_err(|_| Error::Block)?),
@@ -286,7 +268,7 @@ impl<'m> Baked<'m> {
         if next != elements.unknowns() || head.flags > 3 || head.solved > 1 {
             return Err(Error::Block);
         }
-        let shape = policy::shape(max_bounces, scene.bands());
+        let shape = settings::shape(max_bounces, scene.bands());
         let solved = head.solved == 1;
         let solution = solved.then(|| Solution::get(&mut view, &elements, shape)).transpose()?;
         Ok(Baked { scene, bvh, elements, blocks, settings, solution })

@@ -6,19 +6,22 @@
 
 mod bake;
 pub mod bundle;
+pub mod element;
 mod exact;
+pub mod facing;
 pub mod pack;
 pub mod rows;
 pub mod sink;
+pub mod subdivide;
 pub mod word;
 
-use crate::arena::{View, plain_struct};
-use crate::element::Local;
-use crate::error::Error;
-use crate::index::Index;
-use crate::math::Vec3;
-use crate::octahedron::{self, SKY_BITS};
-use crate::simd::{self, Isa, Task};
+use crate::base::arena::{View, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::Index;
+use crate::base::math::Vec3;
+use crate::base::octahedron::{self, SKY_BITS};
+use crate::base::simd::{self, Isa, Task};
+use crate::coupling::element::Local;
 use bundle::Bundles;
 use core::ops::Range;
 use word::Word;
@@ -147,7 +150,7 @@ impl Record {
         (self.key >> 16) as u32 as usize
     }
 
-    /// A target on which the sun shines from the direction `image` ([`crate::sun_image::pack`]; 0: by lobes or curved
+    /// A target on which the sun shines from the direction `image` (as the radiosity wing packs it; 0: by lobes or curved
     /// mirrors).
     pub fn beam((unknown, _): (usize, Local), word: u16, weight: f64, image: u64) -> Record {
         // records of different images stay apart
@@ -238,7 +241,7 @@ impl<'m> Block<'m> {
     }
 
     /// Bytes of the memory it was opened from that it needs, when that starts on a boundary of
-    /// [`crate::arena::ALIGNMENT`].
+    /// [`crate::base::arena::ALIGNMENT`].
     pub fn extent(&self, memory: &[u8]) -> usize {
         let end = self.records.as_ptr_range().end as usize;
         end.saturating_sub(memory.as_ptr() as usize)

@@ -10,32 +10,34 @@ mod rounds;
 pub use report::*;
 pub use rounds::Rounds;
 
-use crate::accuracy;
-use crate::arena::Memory;
-use crate::beam;
-use crate::bvh::Bvh;
-use crate::camera::{Camera, CameraInput};
-use crate::chain::Solved;
+use crate::base::arena::Memory;
+use crate::base::error::Error;
+use crate::base::index::IndexMut;
+use crate::base::math::Vec3;
+use crate::base::simd::Isa;
+use crate::coupling::element::Elements;
+use crate::coupling::facing::Facing;
 use crate::coupling::rows::{RowSettings, fill};
+use crate::coupling::subdivide::Cut;
 use crate::coupling::{Block, Coupling, sink};
-use crate::element::Elements;
-use crate::error::Error;
-use crate::facets;
-use crate::facing::Facing;
-use crate::image::{self, Tally, Target};
-use crate::index::IndexMut;
-use crate::light::{self, Light, Shape};
-use crate::math::Vec3;
-use crate::policy;
 use crate::radiosity::System;
+use crate::radiosity::accuracy;
+use crate::radiosity::beam;
+use crate::radiosity::direct::{self, Shape};
+use crate::radiosity::limits;
+use crate::radiosity::solver::{self, History, Solver};
+use crate::radiosity::sun_image::{self, Noting, SunImages};
+use crate::rays::bvh::Bvh;
+use crate::scene::light::{self, Light};
+use crate::scene::sky::{Sky, SkyInput};
+use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{Scene, SceneInput};
-use crate::signature::{self, Signature, Sums, View};
-use crate::simd::Isa;
-use crate::sky::{Sky, SkyInput};
-use crate::solver::{self, History, Solver};
-use crate::subdivide::Cut;
-use crate::sun::{Sun, SunInput};
-use crate::sun_image::{self, Noting, SunImages};
+use crate::settings;
+use crate::view::camera::{Camera, CameraInput};
+use crate::view::chain::Solved;
+use crate::view::facets;
+use crate::view::image::{self, Tally, Target};
+use crate::view::signature::{self, Signature, Sums, View};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::time::Instant;
@@ -185,9 +187,9 @@ impl Host {
         input: &SceneInput<'_>,
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
-        policy::check_tolerance(settings.tolerance)?;
+        settings::check_tolerance(settings.tolerance)?;
         if let Some(image) = settings.image_tolerance {
-            policy::check_tolerance(image)?;
+            settings::check_tolerance(image)?;
         }
         if let Some(reference) = &settings.reference_radiance {
             light::check_reference(reference, input.bands)?;
@@ -212,12 +214,12 @@ impl Host {
             settings.directional,
             settings.all_irradiances,
         );
-        let wanted = policy::planes(&scene, &rows);
+        let wanted = settings::planes(&scene, &rows);
         let mut planes = Memory::new(Facing::bytes(&scene, wanted)?);
         let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
         let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
         let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
-        let probing = policy::probing(&rows);
+        let probing = settings::probing(&rows);
         loop {
             let (work, unevenness) = cut.work();
             let probes = self.split(unevenness, 1, |range, out| {
@@ -231,7 +233,7 @@ impl Host {
         *element_memory = Memory::new(Elements::bytes(&cut)?);
         let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
-        let unmerged = policy::unmerged(&rows);
+        let unmerged = settings::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
             fill(&scene, &bvh, &elements, &facing, &rows, range, memory)
         })?;
@@ -270,8 +272,8 @@ impl Host {
     /// The light of a scene, solved: no visibility is computed again.
     ///
     /// # Errors
-    /// What [`Sky::new`] and [`Sun::new`] refuse, radiances above 1e37 ([`policy::check_radiance`],
-    /// [`policy::check_highlights`]), a system that diverges.
+    /// What [`Sky::new`] and [`Sun::new`] refuse, radiances above 1e37 ([`limits::check_radiance`],
+    /// [`limits::check_highlights`]), a system that diverges.
     pub fn light<'g>(
         &self,
         geometry: &'g Geometry<'g>,
@@ -296,27 +298,27 @@ impl Host {
             sky: sky.map(|s| Sky::new(s, bands)).transpose()?,
             sun: sun.map(|s| Sun::new(s, bands)).transpose()?,
         };
-        policy::check_highlights(scene, &light)?;
+        limits::check_highlights(scene, &light)?;
         let mut reference = std::vec![0.0; bands];
         match &geometry.settings.reference_radiance {
             Some(given) => reference.copy_from_slice(given),
             None => light.reference_radiance(scene, &mut reference),
         }
         let coupling = geometry.coupling()?;
-        let shape = policy::shape(geometry.settings.max_bounces, bands);
+        let shape = settings::shape(geometry.settings.max_bounces, bands);
         let unknowns = elements.unknowns();
         let mut direct = std::vec![0.0; unknowns * shape.stride()];
         if let Some(sky) = &light.sky {
-            let accuracy = policy::sky_accuracy(geometry.settings.of_image());
+            let accuracy = settings::sky_accuracy(geometry.settings.of_image());
             self.split(&mut direct, shape.stride(), |range, out| {
-                light::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
+                direct::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
             })?;
         }
         let mut lit_share = std::vec![0.0; unknowns];
         let mut suns = Suns::default();
         if let Some(sun) = &light.sun {
             let rays = self.split(&mut lit_share, 1, |range, out| {
-                light::sun_rows(scene, &geometry.bvh, elements, &coupling, sun, range, out)
+                direct::sun_rows(scene, &geometry.bvh, elements, &coupling, sun, range, out)
             })?;
             report.rays.sun += rays.iter().sum::<u64>();
             report.rays.sun += self.beams(geometry, sun, shape, &mut direct, &mut suns)?;
@@ -335,18 +337,18 @@ impl Host {
                 system.slopes(range, &irradiance, out);
                 Ok(())
             })?;
-            light::add(&missed, shape, &mut direct);
+            direct::add(&missed, shape, &mut direct);
             let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
             irradiance = self.solve(&system, &geometry.settings, &reference, &mut solving, &mut report)?;
         }
         let radiance = solving.radiance;
-        policy::check_radiance(&radiance, bands)?;
+        limits::check_radiance(&radiance, bands)?;
         let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
         let sides = elements.facet_sides();
         suns.images().take_off(shape, sides, |unknown| elements.facet_side(unknown), &mut irradiance);
         system.extend(&mut irradiance);
         let variance = self.accuracy(&system, &radiance, &reference)?;
-        let brightest = policy::brightest(scene, light, &reference, &radiance);
+        let brightest = limits::brightest(scene, light, &reference, &radiance);
         report.reference_radiance = reference.clone();
         report.seconds.radiosity = clock.lap();
         let light = *light;
@@ -388,7 +390,7 @@ impl Host {
         let scene = &geometry.scene;
         let Settings { max_bounces, all_irradiances, .. } = geometry.settings;
         let tolerance = geometry.settings.of_image();
-        let Some(settings) = policy::beams(scene, sun, tolerance, max_bounces, all_irradiances) else {
+        let Some(settings) = settings::beams(scene, sun, tolerance, max_bounces, all_irradiances) else {
             return Ok(0);
         };
         let rows = scene.facets() * scene.sides();
@@ -680,7 +682,7 @@ impl Lit<'_> {
             variance: &self.variance,
             reference: &self.reference,
             brightest: self.brightest,
-            settings: policy::chains(
+            settings: settings::chains(
                 (settings.of_image(), settings.tolerance),
                 settings.max_bounces,
                 self.geometry.rays,
@@ -690,7 +692,7 @@ impl Lit<'_> {
 
     /// The cells of a signature along `forward`.
     fn view(&self, solved: &Solved<'_>, forward: Vec3) -> Result<View, Error> {
-        View::new(solved, forward, policy::signature_cells(self.geometry.settings.tolerance))
+        View::new(solved, forward, settings::signature_cells(self.geometry.settings.tolerance))
     }
 
     /// What the sums over all cells of a signature along `forward` say, and their rays.

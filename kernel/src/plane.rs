@@ -34,7 +34,7 @@ pub mod view;
 
 pub use glam::DVec2 as Vec2;
 
-use crate::math::sqrt;
+use crate::base::math::sqrt;
 
 /// The third component of the vector product: positive where `b` is counter-clockwise of `a`.
 #[inline(always)]

@@ -2,14 +2,22 @@
 //!
 //! I = emission + rho_d/pi E and E = E_0 + pi sum K I, by Jacobi's iteration, whose rows are independent, so
 //! that any split gives the same bits, and whose error after a sweep is bounded by the change of that sweep. Where
-//! that would take many sweeps, [`crate::solver`] makes the most of few.
+//! that would take many sweeps, [`crate::radiosity::solver`] makes the most of few.
 
+pub mod accuracy;
+pub mod beam;
+pub mod direct;
+pub mod limits;
+pub mod solver;
+pub mod sun_image;
+
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut, copy, pieces, span};
+use crate::base::math::{FRAC_1_PI, PI, fabs, sqrt};
+use crate::coupling::element::Elements;
 use crate::coupling::{Coupling, RowView, TRACED};
-use crate::element::Elements;
-use crate::error::Error;
-use crate::index::{Index, IndexMut, copy, pieces, span};
-use crate::light::{Light, Shape};
-use crate::math::{FRAC_1_PI, PI, fabs, sqrt};
+use crate::radiosity::direct::Shape;
+use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
 
@@ -100,7 +108,7 @@ impl System<'_> {
     }
 
     /// What the rows of `range` absorb or let out of a radiance of 1 from everywhere, for
-    /// [`crate::solver::History`].
+    /// [`crate::radiosity::solver::History`].
     pub fn deficits(&self, range: Range<usize>, out: &mut [f64]) {
         let bands = self.shape.bands;
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
@@ -111,7 +119,7 @@ impl System<'_> {
     }
 
     /// Area over rho_d, in scene units, of the value `at` a table of one value per unknown and band: what makes fluxes of
-    /// radiances for [`crate::solver::History`]; 0 where nothing is reflected.
+    /// radiances for [`crate::radiosity::solver::History`]; 0 where nothing is reflected.
     pub fn weight(&self, at: usize) -> f64 {
         let bands = self.shape.bands.max(1);
         let (unknown, band) = (at / bands, at % bands);
@@ -321,7 +329,7 @@ pub fn sweeps(q: f64, goal: f64) -> u32 {
     if q >= 1.0 {
         return u32::MAX;
     }
-    (libm::ceil(crate::math::log(goal) / crate::math::log(q)) + 1.0).min(1e9) as u32
+    (libm::ceil(crate::base::math::log(goal) / crate::base::math::log(q)) + 1.0).min(1e9) as u32
 }
 
 /// Bound on the error of all radiances after a sweep that changed them by at most `change`, at contraction `q`.

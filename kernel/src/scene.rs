@@ -7,11 +7,15 @@
 pub(crate) mod bake;
 mod check;
 mod input;
+pub mod light;
+pub mod lobe;
+pub mod sky;
+pub mod sun;
 
-use crate::arena::{Arena, Need};
-use crate::error::Error;
-use crate::index::{Index, pieces};
-use crate::math::{Vec3, sqrt, unit};
+use crate::base::arena::{Arena, Need};
+use crate::base::error::Error;
+use crate::base::index::{Index, pieces};
+use crate::base::math::{Vec3, sqrt, unit};
 
 pub use input::*;
 

@@ -3,11 +3,11 @@
 use super::bundle::Bundles;
 use super::word::{EMPTY, LONGEST, Word};
 use super::{ABSENT, BLOCKED, Block, ENCLOSED, Head, Record, Row};
-use crate::arena::View;
-use crate::bake::Writer;
-use crate::element::Elements;
-use crate::error::Error;
-use crate::index::Index;
+use crate::base::arena::View;
+use crate::base::arena::Writer;
+use crate::base::error::Error;
+use crate::base::index::Index;
+use crate::coupling::element::Elements;
 use crate::scene::Scene;
 
 impl<'m> Block<'m> {

@@ -5,10 +5,10 @@
 //! words, each bundle a head and its directions, zeros to the end of the last record.
 
 use super::Record;
-use crate::arena;
-use crate::index::{Index, IndexMut, copy};
-use crate::math::Vec3;
-use crate::octahedron::{self, SKY_BITS};
+use crate::base::arena;
+use crate::base::index::{Index, IndexMut, copy};
+use crate::base::math::Vec3;
+use crate::base::octahedron::{self, SKY_BITS};
 use core::cmp::Ordering;
 
 /// Words of a bundle's head: count, word, weight (2), gradient (2), checks (4).

@@ -1,6 +1,6 @@
 //! Entries of a row to facets that nothing hides: form factors in closed form from points of the element, no rays.
 //!
-//! [`crate::facing`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
+//! [`crate::coupling::facing`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
 //! each of the element's quarters takes Gauss points as near to each other as the distance asks for, and makes mean,
 //! gradients and the departure from them as rays' hits would. The quadrature's error is a small part of that which
 //! the row's rays would have.
@@ -8,14 +8,14 @@
 use super::sink::Sink;
 use super::word::EMPTY;
 use super::{BLOCKED, Record};
-use crate::element::Elements;
-use crate::facing::{Clear, Facing, Receiver};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, clamp, fabs, pow, sqrt};
+use crate::base::quarter::{self, Path, QUARTERS, point};
+use crate::base::simd::Isa;
+use crate::coupling::element::Elements;
+use crate::coupling::facing::{Clear, Facing, Receiver};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
-use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, clamp, fabs, pow, sqrt};
-use crate::quarter::{self, Path, QUARTERS, point};
 use crate::scene::{NO_MIRROR, Scene};
-use crate::simd::Isa;
 
 /// Gauss points of a triangle: weights of corners 1 and 2, weight. Of degree 1, 2 and 4 (Strang and Fix, 1973).
 const ONE: [(f64, f64, f64); 1] = [(1.0 / 3.0, 1.0 / 3.0, 1.0)];
@@ -485,9 +485,9 @@ fn distance(point: Vec3, triangle: &[Vec3; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::math::unit;
+    use crate::base::qmc::hash2;
     use crate::form_factor::polygon_to_polygon;
-    use crate::math::unit;
-    use crate::qmc::hash2;
 
     fn place(corners: [Vec3; 3], error: f64) -> (Receiver, Rules) {
         let normal = unit((corners[1] - corners[0]).cross(corners[2] - corners[0])).unwrap();

@@ -2,9 +2,9 @@
 
 use super::word::Word;
 use super::{Head, Record, Row};
-use crate::arena::{ALIGNMENT, Arena, View};
-use crate::error::Error;
-use crate::index::{Index, IndexMut};
+use crate::base::arena::{ALIGNMENT, Arena, View};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
 
 /// Bytes of a block of so many rows, words and records without room to spare, on a boundary of
 /// [`ALIGNMENT`].

@@ -6,7 +6,7 @@
 //! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
-//! What nothing hides ([`crate::facing`]) is entered in closed form instead (`exact.rs`) where that costs less:
+//! What nothing hides ([`crate::coupling::facing`]) is entered in closed form instead (`exact.rs`) where that costs less:
 //! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
 //! hemisphere, which is known.
 //!
@@ -18,20 +18,20 @@ use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
-use crate::arena::{Arena, Need};
-use crate::bvh::{Bvh, GROUP};
-use crate::element::Elements;
-use crate::error::Error;
-use crate::facing::{Clear, Facing, Receiver};
-use crate::index::{Index, IndexMut};
-use crate::inside::inside;
-use crate::math::{Vec3, clamp, frame, pow};
-use crate::mirror::{Surface, opens_to_sky};
-use crate::qmc::{Sequence, cosine_direction, hash2, triangle};
-use crate::quarter::{self, QUARTERS};
-use crate::ray::{Hit, Ray};
+use crate::base::arena::{Arena, Need};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, clamp, frame, pow};
+use crate::base::qmc::{Sequence, cosine_direction, hash2, triangle};
+use crate::base::quarter::{self, QUARTERS};
+use crate::coupling::element::Elements;
+use crate::coupling::facing::{Clear, Facing, Receiver};
+use crate::coupling::subdivide::INSIDE;
+use crate::rays::bvh::{Bvh, GROUP};
+use crate::rays::inside::inside;
+use crate::rays::ray::{Hit, Ray};
+use crate::rays::surface::{Surface, opens_to_sky};
 use crate::scene::Scene;
-use crate::subdivide::INSIDE;
 use core::f64::consts::SQRT_2;
 use core::ops::Range;
 
@@ -657,7 +657,7 @@ pub fn lobe_point(sequence: &Sequence, index: u32, depth: u32) -> (f64, f64) {
     let (s, t) = sequence.pair(index, 4);
     let turn = |x: f64, step: f64| {
         let y = x + step * f64::from(depth);
-        y - crate::math::floor(y)
+        y - crate::base::math::floor(y)
     };
     (turn(s, 0.754_877_666_246_693), turn(t, 0.569_840_290_998_053))
 }

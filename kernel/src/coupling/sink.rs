@@ -2,12 +2,12 @@
 
 use super::word::{EMPTY, Word, Words};
 use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
-use crate::arena::{ALIGNMENT, Arena, Need};
-use crate::error::Error;
-use crate::facing::WORDS;
-use crate::index::{Index, IndexMut};
+use crate::base::arena::{ALIGNMENT, Arena, Need};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::sort;
+use crate::coupling::facing::WORDS;
 use crate::scene::Scene;
-use crate::sort;
 use core::cmp::Ordering;
 use core::ops::Range;
 

@@ -5,8 +5,8 @@
 //! path from the root names the classes in ascending order, so that a product is always multiplied in the same
 //! order and its bits do not depend on the order in which paths were found.
 
-use crate::arena::plain_struct;
-use crate::index::{Index, IndexMut};
+use crate::base::arena::plain_struct;
+use crate::base::index::{Index, IndexMut};
 use crate::scene::Scene;
 use core::cmp::Ordering;
 

@@ -1,7 +1,7 @@
 //! The angle of a vector in the upper half plane, as straight-line code that vectorises.
 
-use crate::math::{FRAC_PI_2, PI};
-use crate::simd::{Lanes64, Wide};
+use crate::base::math::{FRAC_PI_2, PI};
+use crate::base::simd::{Lanes64, Wide};
 
 /// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
 const LOW: f64 = 0.414_213_562_373_095_05;
@@ -82,8 +82,8 @@ fn select(condition: bool, yes: f64, no: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{atan2, cos, sin};
-    use crate::simd::{Isa, WIDTH, WideTask, run_wide};
+    use crate::base::math::{atan2, cos, sin};
+    use crate::base::simd::{Isa, WIDTH, WideTask, run_wide};
 
     struct Angles([f64; WIDTH], [f64; WIDTH]);
 

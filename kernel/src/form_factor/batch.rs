@@ -2,8 +2,8 @@
 
 use super::angle::angle;
 use super::point::share;
-use crate::math::Vec3;
-use crate::simd::{Isa, Task, run};
+use crate::base::math::Vec3;
+use crate::base::simd::{Isa, Task, run};
 
 /// Triangles in a block: two registers of the widest instruction set, so that their latencies overlap.
 pub const LANES: usize = 8;
@@ -105,7 +105,7 @@ mod tests {
         for k in -900..900 {
             for m in [1.0, 1.3, 1.9, 2.7, 3.999] {
                 let x = m * 2f64.powi(k);
-                let want = 1.0 / crate::math::sqrt(x);
+                let want = 1.0 / crate::base::math::sqrt(x);
                 assert!((inverse_sqrt(x) / want - 1.0).abs() < 4.5e-16, "{x:e}");
             }
         }

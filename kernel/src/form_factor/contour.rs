@@ -3,10 +3,10 @@
 
 use super::angle::wide_angle;
 use super::convex::{CAPACITY, Convex, edges};
-use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, fabs, sqrt};
-use crate::quadrature::Gauss;
-use crate::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, fabs, sqrt};
+use crate::base::quadrature::Gauss;
+use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
 
 /// Panels shorter than this share of an edge are not split further: over one, the integrand's singular part
 /// (x ln x) weighs 1e-12, of which the rule still gets all but 1e-4.
@@ -264,7 +264,7 @@ fn cut(from: f64, to: f64, z: Singular) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::log;
+    use crate::base::math::log;
 
     struct Logs([f64; WIDTH]);
 

@@ -1,6 +1,6 @@
 //! Convex polygons of a fixed capacity, and clipping them.
 
-use crate::math::Vec3;
+use crate::base::math::Vec3;
 
 /// Corners that a [`Convex`] holds.
 pub(super) const CAPACITY: usize = 10;

@@ -4,8 +4,8 @@ use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
 use super::patch::{Patch, Way, patches};
 use super::rule::Rule;
-use crate::math::{FRAC_1_PI, Vec3, sqrt, unit};
-use crate::simd::Isa;
+use crate::base::math::{FRAC_1_PI, Vec3, sqrt, unit};
+use crate::base::simd::Isa;
 use core::cmp::Ordering;
 
 /// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.

@@ -1,7 +1,7 @@
 //! Quadrilateral patches and the area form of the form factor between them, by Gauss points.
 
 use super::rule::{GAUSS_2, GAUSS_3, GAUSS_4, GAUSS_5, GAUSS_6, Rule};
-use crate::math::{FRAC_1_PI, Vec3, sqrt};
+use crate::base::math::{FRAC_1_PI, Vec3, sqrt};
 
 /// Rules by how many times farther apart than large two patches are, for a relative error of at most 1e-10:
 /// measured on 3,000 random pairs of triangles each, the worst being those that see each other edge-on.

@@ -2,7 +2,7 @@
 
 use super::angle::angle;
 use super::convex::{double_area, edges};
-use crate::math::{FRAC_1_PI, Vec3, sqrt};
+use crate::base::math::{FRAC_1_PI, Vec3, sqrt};
 
 /// Distances from a plane below this share of the polygon's size are rounding: the point lies in the plane.
 const FLAT: f64 = 8.0 * f64::EPSILON;

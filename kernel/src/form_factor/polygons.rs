@@ -6,11 +6,11 @@ use super::pair::{exchange_area_with, power_of_two_below};
 use super::product::{
     BEHIND, Block, Classes, EXACT, Eight, PLACES, Place, Places, Product, Rule, SHAPES, Shape,
 };
-use crate::arena::{Arena, Need};
-use crate::error::{Error, Field};
-use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, unit};
-use crate::simd::{Isa, WIDTH, run_wide};
+use crate::base::arena::{Arena, Need};
+use crate::base::error::{Error, Field};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, unit};
+use crate::base::simd::{Isa, WIDTH, run_wide};
 use core::ops::Range;
 
 /// Least distance between a patch's centre and the sphere about the other patch, in units of the own radius, for which

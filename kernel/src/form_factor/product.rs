@@ -1,10 +1,10 @@
 //! The area form of the exchange area, of eight pairs of patches side by side.
 
 use super::cubature::{LARGEST, Points, RULES, SQUARE, TRIANGLE};
-use crate::arena::plain_table;
-use crate::index::{Index, IndexMut, pieces};
-use crate::math::{FRAC_1_PI, Vec3, fabs, sqrt};
-use crate::simd::{Lanes64, WIDTH, Wide, WideTask};
+use crate::base::arena::plain_table;
+use crate::base::index::{Index, IndexMut, pieces};
+use crate::base::math::{FRAC_1_PI, Vec3, fabs, sqrt};
+use crate::base::simd::{Lanes64, WIDTH, Wide, WideTask};
 
 /// A number in each lane.
 pub(super) type Eight = [f64; WIDTH];

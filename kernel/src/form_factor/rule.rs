@@ -1,6 +1,6 @@
 //! The Gauss-Legendre rules in use here, on [0, 1].
 
-use crate::quadrature::Gauss;
+use crate::base::quadrature::Gauss;
 
 /// A rule of any number of points.
 #[derive(Clone, Copy)]

@@ -5,9 +5,9 @@ use super::pair::{fronts, polygon_to_polygon};
 use super::patch::{Patch, Way, patches};
 use super::point::point_to_polygon;
 use super::rule::GAUSS_3;
-use crate::error::Error;
-use crate::index::{Index, IndexMut};
-use crate::math::{Vec3, clamp, sqrt, unit};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, clamp, sqrt, unit};
 
 /// Rounding of a height, as a share of the distance.
 const ON_PLANE: f64 = 2e-15;

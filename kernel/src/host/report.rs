@@ -1,11 +1,11 @@
 //! What comes back with every result: how good it is, what was done, what was not needed.
 
 use crate::coupling::{ABSENT, Coupling, OPEN};
-use crate::image::Tally;
-use crate::light::Light;
-use crate::policy;
 use crate::scene::Scene;
-use crate::sky::Sky;
+use crate::scene::light::Light;
+use crate::scene::sky::Sky;
+use crate::view::estimate;
+use crate::view::image::Tally;
 use std::vec::Vec;
 
 /// The keys of the program's `report.json`; seconds of reading and writing are the program's own.
@@ -174,7 +174,7 @@ impl Report {
         self.skip("pixels of which the centre is enough", (pixels as u64).saturating_sub(tally.refined));
         self.certified.chain_tail = tally.tail;
         self.certified.excludes = std::vec!["visibility", "light", "interpolation", "sampling"];
-        let (error, limit) = policy::estimate(tally, self.certified.solver);
+        let (error, limit) = estimate::estimate(tally, self.certified.solver);
         (self.error_estimate, self.limited_by) = (error, limit.name());
         self.tolerance_met = self.error_estimate <= self.tolerance;
     }

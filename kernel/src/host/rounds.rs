@@ -1,7 +1,9 @@
 //! Images that come out worse than asked are computed again, more finely.
 
 use super::{Rays, Report, Seconds, Settings};
-use crate::policy::{self, Limit, Round};
+use crate::rounds::{self, Round};
+use crate::settings;
+use crate::view::estimate::Limit;
 
 /// The rounds of one image. Each computes geometry, light and image by [`Rounds::settings`], and asks
 /// [`Rounds::again`] whether there is to be another. Images of little tolerance begin with a coarser solution. The last
@@ -44,13 +46,13 @@ impl Rounds {
     /// Rounds of an image whose error is to be `tolerance`.
     pub fn new(tolerance: f64) -> Rounds {
         let (seconds, rays) = (Seconds::default(), Rays::default());
-        let first = policy::first(tolerance);
+        let first = rounds::first(tolerance);
         Rounds { asked: tolerance, tolerance: first, done: 0, last: None, seconds, rays }
     }
 
     /// What the present round is to be computed by: `settings` but for their tolerances.
     pub fn settings(&mut self, settings: Settings) -> Settings {
-        if self.done == 0 && policy::shape(settings.max_bounces, 1).levels > 1 {
+        if self.done == 0 && settings::shape(settings.max_bounces, 1).levels > 1 {
             // no rays from points, which would mend a coarse solution
             self.tolerance = self.asked;
         }
@@ -73,7 +75,7 @@ impl Rounds {
         report.tolerance = self.asked;
         report.tolerance_met = report.error_estimate <= self.asked;
         (report.seconds, report.rays, report.rounds) = (self.seconds, self.rays, self.done);
-        let next = policy::again(self.asked, &round, self.last.as_ref(), self.done);
+        let next = rounds::again(self.asked, &round, self.last.as_ref(), self.done);
         self.last = Some(round);
         self.tolerance = next.unwrap_or(self.tolerance);
         next.is_some()

@@ -1,9 +1,9 @@
 //! Lobes that a path has met, each with those of its rays that are still to be followed: a path of any number of lobes
 //! takes no stack.
 
-use crate::arena::plain_struct;
-use crate::index::Index;
-use crate::math::{cos, sin};
+use crate::base::arena::plain_struct;
+use crate::base::index::Index;
+use crate::base::math::{cos, sin};
 use crate::plane::lobe::{PlaneLobe, Visible};
 use crate::plane::scene::{NOWHERE, RaySet};
 use crate::plane::trace::{Chains, Hit, Leg, Sink, graded_node, graded_sum, node, points};

@@ -1,7 +1,7 @@
 //! The owning layer over the plane model, for programs with a heap: one thread, as the paper's times are.
 
-use crate::arena::Memory;
-use crate::error::Error;
+use crate::base::arena::Memory;
+use crate::base::error::Error;
 use crate::plane::image::{self, Seen, Solved, View};
 use crate::plane::light::{self, Light};
 use crate::plane::rows::{self, RowInfo};

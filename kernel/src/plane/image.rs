@@ -1,8 +1,8 @@
 //! Images of the plane model: one line of samples, eq. (15) along each sample's ray.
 
-use crate::error::{Error, Field};
-use crate::index::span;
-use crate::math::{cos, sin};
+use crate::base::error::{Error, Field};
+use crate::base::index::span;
+use crate::base::math::{cos, sin};
 use crate::plane::Vec2;
 use crate::plane::light::Light;
 use crate::plane::lobe::PlaneLobe;

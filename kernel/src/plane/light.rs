@@ -1,8 +1,8 @@
 //! Sky and sun on every unknown, straight and by way of mirrors and lobes: the right-hand side of eq. (12).
 
-use crate::error::{Error, Field};
-use crate::index::{Index, IndexMut, parts, pieces, span};
-use crate::math::{cos, fabs, sin};
+use crate::base::error::{Error, Field};
+use crate::base::index::{Index, IndexMut, parts, pieces, span};
+use crate::base::math::{cos, fabs, sin};
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::rows::{Gather, RowSettings, check_bounces, class, gather};
 use crate::plane::scene::PlaneScene;

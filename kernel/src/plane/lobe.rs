@@ -1,15 +1,15 @@
-//! The flatland form of the lobe of [`crate::lobe`], with its closed forms.
+//! The flatland form of the lobe of [`crate::scene::lobe`], with its closed forms.
 //!
 //! q = rho_0 C cos(alpha)/(cos^2 alpha + T^2 sin^2 alpha) for |alpha| < 90 degrees, k = sqrt(T^2 - 1) and
 //! C = k/(2 atan k), so that the whole lobe holds rho_0. The energy between two angles is a difference of
 //! W(alpha) = atan(k sin alpha)/atan(k), halved: sampling and albedo need one arc tangent each.
 
-use crate::arena::plain_struct;
-use crate::error::{Error, Field};
-use crate::lobe::mean_over_angle;
-use crate::math::{PI, atan, clamp, sqrt, tan};
+use crate::base::arena::plain_struct;
+use crate::base::error::{Error, Field};
+use crate::base::math::{PI, atan, clamp, sqrt, tan};
 use crate::plane::{Vec2, cross, turned};
 use crate::scene::MIRROR_AXIS_RATIO;
+use crate::scene::lobe::mean_over_angle;
 
 plain_struct! {
     /// A lobe of a given axis ratio, for a reflectance rho_0 of 1.

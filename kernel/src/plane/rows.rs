@@ -1,10 +1,10 @@
 //! Rows of extended form factors: which share of an unknown's half circle shows which other unknowns, straight
 //! or by way of mirrors and lobes, itself included, and which share the sky (eq. 12).
 
-use crate::arena::plain_struct;
-use crate::error::{Error, Field};
-use crate::index::{IndexMut, pieces, span};
-use crate::math::{clamp, floor, sqrt};
+use crate::base::arena::plain_struct;
+use crate::base::error::{Error, Field};
+use crate::base::index::{IndexMut, pieces, span};
+use crate::base::math::{clamp, floor, sqrt};
 use crate::plane::light::Light;
 use crate::plane::scene::{PlaneScene, Primitive};
 use crate::plane::trace::{Chains, Hit, Leg, Sink, graded, nodes};

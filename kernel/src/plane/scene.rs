@@ -3,10 +3,10 @@
 mod check;
 mod layout;
 
-use crate::arena::{Arena, Need, plain_struct};
-use crate::error::{Error, Field};
-use crate::index::{Index, IndexMut};
-use crate::math::{TAU, asin, atan2, clamp, cos, floor, sin};
+use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::error::{Error, Field};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{TAU, asin, atan2, clamp, cos, floor, sin};
 use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::stencil::{MAX_ORDER, NODES, Stencil};

@@ -1,6 +1,6 @@
 //! How a scene of the plane model is solved.
 
-use crate::error::{Error, Field};
+use crate::base::error::{Error, Field};
 use crate::plane::rows::{Method, RowSettings, check_bounces};
 use crate::plane::scene::Basis;
 

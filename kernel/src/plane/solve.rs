@@ -1,13 +1,52 @@
 //! Solves eq. (12) for the diffuse radiance of all unknowns, by the sweeps of [`crate::radiosity`]: rows are
 //! independent, so that any split gives the same bits, and the change of a sweep bounds the error.
 
-use crate::error::Error;
-use crate::index::copy;
-use crate::math::fabs;
+use crate::base::error::Error;
+use crate::base::index::copy;
+use crate::base::math::fabs;
 use crate::plane::scene::PlaneScene;
-use crate::policy::Sweeps;
 pub use crate::radiosity::{bound, sweeps};
 use core::ops::Range;
+
+/// When the sweeps over a linear system whose weights may be negative end: as soon as the bound on their error is a
+/// small part of the tolerance. [`crate::radiosity::solver::Solver`] is for all others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweeps {
+    /// Sweeps done.
+    pub done: u32,
+    /// Bound on the radiances' error, relative to the reference radiance.
+    pub error: f64,
+    q: f64,
+    goal: f64,
+    most: u32,
+}
+
+impl Sweeps {
+    /// Before the first sweep of a system of contraction `q` (the largest over all rows), until the bound on the error
+    /// is at most `goal`.
+    pub fn until(q: f64, goal: f64) -> Sweeps {
+        let most = if q < 1.0 { sweeps(q, goal).saturating_add(200).min(100_000) } else { 2_000 };
+        Sweeps { done: 0, error: f64::INFINITY, q, goal, most }
+    }
+
+    /// True where another sweep is wanted.
+    pub fn more(&self) -> bool {
+        self.error > self.goal && self.done < self.most
+    }
+
+    /// Notes a sweep that changed the radiances by at most `change`.
+    ///
+    /// # Errors
+    /// [`Error::Diverges`] where the last sweep allowed did not end it and nothing bounds the rest.
+    pub fn took(&mut self, change: f64) -> Result<(), Error> {
+        self.done += 1;
+        self.error = bound(change, self.q);
+        if self.done >= self.most && self.q >= 1.0 {
+            return Err(Error::Diverges { row_sum: self.q });
+        }
+        Ok(())
+    }
+}
 
 /// How [`System::solve`] went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,6 @@
 //! Which unknowns make the diffuse radiance at a point of an element, and with which weights.
 
-use crate::quadrature::Gauss;
+use crate::base::quadrature::Gauss;
 
 /// Most Gauss points of an element.
 pub const MAX_ORDER: usize = 6;

@@ -1,13 +1,13 @@
 //! First hits, and chains by way of mirrors and lobes.
 
-use crate::index::Index;
-use crate::math::{fabs, sqrt};
+use crate::base::index::Index;
+use crate::base::math::{fabs, sqrt};
+use crate::base::quadrature::rule;
 use crate::plane::fork::Fork;
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
 use crate::plane::view::Scratch;
 use crate::plane::{Vec2, cross, length, reflect};
-use crate::quadrature::rule;
 
 /// A first hit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,14 +1,14 @@
 //! What a point sees: the half circle above a surface, cut at every silhouette, each span with its first hit.
 
-use crate::arena::{Arena, Need, plain_struct};
-use crate::error::Error;
-use crate::index::{Index, IndexMut};
-use crate::math::sqrt;
+use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::sqrt;
+use crate::base::sort::sort;
 use crate::plane::fork::Fork;
 use crate::plane::scene::{NOWHERE, PlaneScene, Primitive};
 use crate::plane::trace::MOST_LOBES;
 use crate::plane::{Vec2, cross, length, toward};
-use crate::sort::sort;
 
 plain_struct! {
     /// A part of the half circle: directions whose sines to the normal are from `from` to `to`.

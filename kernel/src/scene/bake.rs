@@ -1,11 +1,11 @@
 //! Scenes in baked blocks.
 
 use super::{MAX_BANDS, MIRROR_AXIS_RATIO, MOST_GLOSS_RAYS, NO_MIRROR, Scene, normal_and_area};
-use crate::arena::{View, plain_struct};
-use crate::bake::Writer;
-use crate::error::Error;
-use crate::index::Index;
-use crate::math::Vec3;
+use crate::base::arena::Writer;
+use crate::base::arena::{View, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::Index;
+use crate::base::math::Vec3;
 
 plain_struct! {
     /// A scene without its arrays.

@@ -1,8 +1,8 @@
 //! Everything that can be wrong with a scene's input.
 
 use super::{MAX_BANDS, MOST_GLOSS_RAYS, Mesh, NO_NORMAL, corner_normals, normal_facets};
-use crate::error::{Error, Field};
-use crate::math::{Vec3, unit};
+use crate::base::error::{Error, Field};
+use crate::base::math::{Vec3, unit};
 
 /// Counts that do not fit together.
 pub(super) fn sizes(mesh: &dyn Mesh) -> Result<(), Error> {

@@ -1,9 +1,9 @@
 //! What can be wrong with a scene.
 
 use super::{BODY_ELEMENTS, BODY_RADIUS, BodyInput, PlaneGloss, PlaneInput, RaySet, Shape, segments};
-use crate::error::{Error, Field};
-use crate::index::Index;
-use crate::math::fabs;
+use crate::base::error::{Error, Field};
+use crate::base::index::Index;
+use crate::base::math::fabs;
 use crate::plane::{Vec2, length};
 
 /// Checks materials and bodies.

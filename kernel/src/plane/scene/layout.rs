@@ -1,8 +1,8 @@
 //! Bodies become primitives.
 
 use super::{Body, BodyInput, Primitive, Shape, segments};
-use crate::error::Error;
-use crate::index::Index;
+use crate::base::error::Error;
+use crate::base::index::Index;
 use crate::plane::{Vec2, length};
 
 /// Lays out one body's primitives; counts its elements on.

@@ -1,0 +1,538 @@
+//! How finely each facet is cut: into quarters, and those again, where what arrives varies in a way that no linear
+//! function follows, such as around what stands on a facet or pierces it.
+//!
+//! Geometry, materials and tolerance decide, never sky and sun. Level by level: [`Cut::work`] gives the newest
+//! triangles, [`Work::probe`] (on any range of them) looks how uneven they are, [`Cut::refine`] quarters those whose
+//! error counts most.
+
+use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut, span};
+use crate::base::math::{Vec3, frame};
+use crate::base::qmc::{Sequence, cosine_direction, hash2};
+use crate::base::quarter::{Path, QUARTERS, out_of};
+use crate::base::simd::Isa;
+use crate::coupling::facing::{Clear, Facing, Receiver, WORDS};
+use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
+use crate::rays::bvh::{Ahead, Bvh};
+use crate::rays::surface::{Surface, opens_to_sky};
+use crate::scene::Scene;
+use core::ops::Range;
+
+/// Probed points of a triangle: the middles of its quarters' quarters.
+const POINTS: usize = QUARTERS * QUARTERS;
+
+/// The most rays from one of them.
+pub const MOST_RAYS: u32 = 1024;
+
+/// The fewest.
+const FEWEST_RAYS: u32 = 16;
+
+/// Points that meet this share of black backs lie inside a body, where nothing sees them.
+pub const INSIDE: f64 = 0.9375;
+
+/// The most facets that a triangle's points see for which closed forms cost less than rays.
+const MOST_CLOSED: usize = 2048;
+
+/// Unevenness counts from so many times the noise of half the rays on: one even triangle in ten thousand passes.
+const CERTAIN: f64 = 1.0;
+
+/// From so many times on nothing is gained by more rays.
+const CLEAR: f64 = 4.0;
+
+/// Unevenness of a triangle of which half is hidden in a body, times 4: points near the edge see part of the inside.
+const EDGE: f64 = 0.04;
+
+/// What a quarter keeps of the unevenness of a smooth function.
+const SMOOTH: f64 = 1.0 / 16.0;
+
+plain_struct! {
+    /// A facet, a quarter of one, or a quarter of that.
+    pub struct Node {
+        /// The facet.
+        pub facet: u32,
+        /// Which part of it: a [`Path`].
+        pub path: u32,
+        /// The first of its four quarters; 0: it is an element.
+        pub child: u32,
+    }
+}
+
+/// The facets' trees of quarters while they grow.
+#[derive(Debug)]
+pub struct Cut<'m> {
+    nodes: &'m mut [Node],
+    unevenness: &'m mut [f64],
+    used: usize,
+    fresh: usize,
+    facets: usize,
+    /// Mean square error, over the object's area, of the triangles that stay as they are.
+    settled: f64,
+    goal: f64,
+    most: usize,
+}
+
+/// The newest triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct Work<'a> {
+    nodes: &'a [Node],
+}
+
+/// Elements that a mesh of any facets may have beyond them, at a tolerance of 2e-3.
+const COARSE: f64 = 4096.0;
+
+/// Mean square error that elements may leave, over the square of the tolerance: what arrives differs from what the
+/// probing rays can tell before light is known.
+const GOAL: f64 = 0.06;
+
+/// The most elements of a scene of `facets` facets: 1 + 2e-3/tolerance times as many, and some more for coarse meshes.
+pub fn most_elements(facets: usize, tolerance: f64) -> usize {
+    let finer = 2e-3 / tolerance;
+    (facets as f64 * (1.0 + finer) + COARSE * finer.min(1.0)) as usize
+}
+
+/// Nodes of a tree with so many leaves.
+fn most_nodes(facets: usize, tolerance: f64) -> usize {
+    // each cut adds four nodes and three elements
+    facets.saturating_add(
+        (most_elements(facets, tolerance).saturating_sub(facets) / 3).saturating_mul(QUARTERS),
+    )
+}
+
+impl<'m> Cut<'m> {
+    /// Bytes for a scene of so many facets.
+    pub fn bytes(facets: usize, tolerance: f64) -> Result<usize, Error> {
+        let nodes = most_nodes(facets, tolerance);
+        // two sides and the flag bit of a coupling's record must fit into 32 bits
+        let limit = 1usize << 29;
+        if nodes > limit {
+            return Err(Error::TooMany { what: "elements", limit });
+        }
+        Need::new().and::<Node>(nodes).and::<f64>(nodes).bytes()
+    }
+
+    /// Every facet whole, and to be probed.
+    pub fn new(scene: &Scene<'_>, tolerance: f64, memory: &'m mut [u8]) -> Result<Cut<'m>, Error> {
+        let facets = scene.facets();
+        let mut arena = Arena::new(memory, Cut::bytes(facets, tolerance)?)?;
+        let capacity = most_nodes(facets, tolerance);
+        let nodes = arena.take::<Node>(capacity)?;
+        let unevenness = arena.take::<f64>(capacity)?;
+        for (facet, (node, expected)) in nodes.iter_mut().zip(unevenness.iter_mut()).take(facets).enumerate()
+        {
+            *node = Node { facet: facet as u32, ..Node::default() };
+            *expected = 0.0;
+        }
+        Ok(Cut {
+            nodes,
+            unevenness,
+            used: facets,
+            fresh: 0,
+            facets,
+            settled: 0.0,
+            goal: GOAL * tolerance * tolerance,
+            most: most_elements(facets, tolerance),
+        })
+    }
+
+    /// The triangles to be probed, and where their unevenness is to stand: what is expected of each, to begin with.
+    pub fn work(&mut self) -> (Work<'_>, &mut [f64]) {
+        let range = self.fresh..self.used;
+        (Work { nodes: self.nodes.part(range.clone()) }, self.unevenness.part_mut(range))
+    }
+
+    /// Quarters those of the probed triangles whose errors count most, and says whether there are new ones.
+    ///
+    /// A triangle's part of the mean square error over the object is a V rho^2 (its share a of the area, unevenness V).
+    /// Those with the least stay as they are, as long as their sum is within half of what is left of a small part of
+    /// the tolerance's square.
+    pub fn refine(&mut self, scene: &Scene<'_>) -> bool {
+        let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let range = self.fresh..self.used;
+        let weight = |node: &Node| {
+            let rho = scene.largest_diffuse_of(node.facet as usize);
+            let share = Path(node.path).share() * scene.areas().at(node.facet as usize) / total;
+            share * rho * rho
+        };
+        for (node, value) in
+            self.nodes.iter().zip(self.unevenness.iter_mut()).take(self.used).skip(self.fresh)
+        {
+            *value = weight(node) * value.max(0.0);
+        }
+        let values = self.unevenness.part(range.clone());
+        let elements = self.facets + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
+        let cuts = (self.most.saturating_sub(elements) * 3 / (4 * (QUARTERS - 1)))
+            .min(self.nodes.len().saturating_sub(self.used) / QUARTERS);
+        let threshold = threshold(values, self.goal - self.settled, cuts);
+        for at in range.clone() {
+            let (node, value) = (self.nodes.at(at), self.unevenness.at(at));
+            let path = Path(node.path);
+            if value < threshold || path.depth() >= Path::DEEPEST {
+                self.settled += value;
+                continue;
+            }
+            self.nodes.set(at, Node { child: self.used as u32, ..node });
+            for quarter in 0..QUARTERS {
+                self.nodes.set(self.used, Node { path: path.step(quarter).0, child: 0, ..node });
+                self.unevenness.set(self.used, SMOOTH * value / weight(&node));
+                self.used += 1;
+            }
+        }
+        self.fresh = range.end;
+        self.used > self.fresh
+    }
+
+    /// All nodes: first the facets', children after their parents.
+    pub fn nodes(&self) -> &[Node] {
+        self.nodes.part(0..self.used)
+    }
+
+    /// Facets.
+    pub fn facets(&self) -> usize {
+        self.facets
+    }
+}
+
+/// The least value that is to be cut: those below sum up to half of `left` at most, those from it on are `cuts` at
+/// most.
+fn threshold(values: &[f64], left: f64, cuts: usize) -> f64 {
+    if values.iter().sum::<f64>() <= left || cuts == 0 {
+        return f64::INFINITY;
+    }
+    let mut threshold = values.iter().fold(0.0, |a: f64, &b| a.max(b));
+    while values.iter().filter(|v| **v < threshold).sum::<f64>() > 0.5 * left && threshold > f64::MIN_POSITIVE
+    {
+        threshold *= 0.8;
+    }
+    while values.iter().filter(|v| **v >= threshold).count() > cuts {
+        threshold *= 1.1;
+    }
+    threshold
+}
+
+impl Work<'_> {
+    /// Triangles.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether there is nothing to do.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Probes the triangles of `range`: how far what arrives departs from a linear function of the position, as a
+    /// variance (of shares of the hemisphere) free of the rays' noise; where noise hides it, what `out` held before
+    /// (at most the noise). Returns the rays traced.
+    ///
+    /// From 16 points of each side go up to `rays` rays ([`MOST_RAYS`] at most), along the same directions: what all
+    /// points see alike brings no noise. The product of what two halves of the directions leave of a linear function is
+    /// free of the noise's bias. Rays end as soon as they settle the matter.
+    pub fn probe(
+        &self,
+        scene: &Scene<'_>,
+        bvh: &Bvh<'_>,
+        facing: &Facing<'_>,
+        (rays, tolerance): (u32, f64),
+        range: Range<usize>,
+        out: &mut [f64],
+    ) -> Result<u64, Error> {
+        if out.len() != span(&range) {
+            return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
+        }
+        let rays = rays.clamp(FEWEST_RAYS, MOST_RAYS);
+        let total = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let many = most_elements(scene.facets(), tolerance) as f64;
+        let mut probe = Probe { scene, bvh, facing, rays, negligible: 0.0, traced: 0 };
+        for (node, value) in self.nodes.part(range).iter().zip(out) {
+            let expected = core::mem::take(value);
+            let facet = node.facet as usize;
+            let rho = scene.largest_diffuse_of(facet);
+            if scene.areas().at(facet) == 0.0 || rho == 0.0 {
+                continue;
+            }
+            let share = Path(node.path).share() * scene.areas().at(facet) / total;
+            probe.negligible =
+                0.25 * GOAL * tolerance * tolerance / (rho * rho) * (1.0 / (many * share)).max(1.0);
+            for side in 0..scene.sides() {
+                if node.path == 0 && opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
+                    continue;
+                }
+                *value = value.max(probe.side(node, side, expected));
+            }
+        }
+        Ok(probe.traced)
+    }
+}
+
+struct Probe<'a> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    facing: &'a Facing<'a>,
+    rays: u32,
+    /// An unevenness that need not be known better.
+    negligible: f64,
+    traced: u64,
+}
+
+/// Facets that are looked at together, and by how much each is brighter than the sky.
+struct Together {
+    block: TriangleBlock,
+    brightness: [f64; LANES],
+    count: usize,
+}
+
+impl Together {
+    fn put(&mut self, triangle: &[Vec3; 3], brightness: f64) {
+        self.block.set(self.count, triangle);
+        self.brightness.set(self.count, brightness);
+        self.count += 1;
+    }
+
+    /// Adds what they send to each point, and forgets them.
+    fn take(&mut self, isa: Isa, points: &[Vec3; POINTS], normal: Vec3, sums: &mut Sums) {
+        for (sum, point) in sums.iter_mut().zip(points) {
+            let mut factors = [[0.0; LANES]];
+            point_to_triangles(isa, *point, normal, core::slice::from_ref(&self.block), &mut factors);
+            let terms = factors[0].iter().zip(&self.brightness).take(self.count);
+            *sum += terms.map(|(factor, brightness)| factor * brightness).sum::<f64>();
+        }
+        self.count = 0;
+    }
+}
+
+/// Sums over the rays of each point.
+type Sums = [f64; POINTS];
+
+impl Probe<'_> {
+    /// Unevenness of one side of a triangle.
+    fn side(&mut self, node: &Node, side: usize, expected: f64) -> f64 {
+        let facet = node.facet as usize;
+        let normal = self.scene.side_normal(facet, side);
+        // only the points differ: surfaces of their own would burden the stack
+        let points = core::array::from_fn(|point| {
+            let (a, b) = middle(point);
+            let (u, v) = Path(node.path).out_of(a, b);
+            Surface::new(self.scene, facet, side, u, v).point
+        });
+        if let Some(even) = self.closed(node, side, &points) {
+            return even;
+        }
+        let from = Surface::new(self.scene, facet, side, 0.0, 0.0);
+        let (x, y) = frame(normal);
+        let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000 ^ node.path));
+        let (mut sums, mut half, mut backs) = ([0.0; POINTS], [0.0; POINTS], [0u32; POINTS]);
+        let (mut index, mut goal) = (0, FEWEST_RAYS.min(self.rays));
+        loop {
+            while index < goal {
+                if 2 * index == goal {
+                    half = sums;
+                }
+                let (p, q) = sequence.pair(index, 0);
+                let (dx, dy, dz) = cosine_direction(p, q);
+                let direction = x * dx + y * dy + normal * dz;
+                self.shoot((&from, &points), direction, &mut sums, &mut backs);
+                index += 1;
+            }
+            let inside = |backs: u32| f64::from(backs) >= INSIDE * f64::from(index);
+            let seen = backs.map(|b| !inside(b));
+            let (even, noise) = residuals(&half, &sums, &seen, 0.5 * f64::from(index));
+            if even + noise < self.negligible || even > CLEAR * noise {
+                return even;
+            }
+            if goal >= self.rays {
+                return if even > CERTAIN * noise { even } else { expected.min(noise) };
+            }
+            goal = (2 * goal).min(self.rays);
+        }
+    }
+
+    /// Unevenness without rays, where nothing hides anything and rays would cost more.
+    // apart: its triangles do not burden the stack of the rays
+    #[inline(never)]
+    fn closed(&self, node: &Node, side: usize, points: &[Vec3; POINTS]) -> Option<f64> {
+        let facet = node.facet as usize;
+        let normal = self.scene.side_normal(facet, side);
+        let corners = Path(node.path).corners(&self.scene.corners().at(facet));
+        let receiver = Receiver { facet, side, normal, corners };
+        let mut proven = [0; WORDS];
+        let mut clear = Clear::new(&mut proven);
+        if !clear.prove_whole(self.scene, self.facing, &receiver, MOST_CLOSED) {
+            return None;
+        }
+        Some(self.closed_residuals(&receiver, &clear, points))
+    }
+
+    /// The same of a triangle for which all that is clear is known.
+    // apart: its sums do not burden the stack of the proof
+    #[inline(never)]
+    fn closed_residuals(&self, receiver: &Receiver, clear: &Clear<'_>, points: &[Vec3; POINTS]) -> f64 {
+        let Receiver { facet, side, normal, .. } = *receiver;
+        let mut sums = [1.0; POINTS];
+        let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
+        for other in self.facing.before(facet, side) {
+            let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
+            for other_side in (0..sides).filter(|&s| clear.has(other, s, sides)) {
+                let surface = Surface::new(self.scene, other, other_side, 1.0 / 3.0, 1.0 / 3.0);
+                let brightness = self.brightness(&surface) - 1.0;
+                if receiver.faces(self.scene, (other, other_side), &triangle) {
+                    together.put(&triangle, brightness);
+                    if together.count == LANES {
+                        together.take(self.bvh.isa(), points, normal, &mut sums);
+                    }
+                    continue;
+                }
+                for (sum, &point) in sums.iter_mut().zip(points) {
+                    if (point - surface.point).dot(surface.normal) > 0.0 {
+                        *sum += brightness * point_to_triangle(point, normal, &triangle);
+                    }
+                }
+            }
+        }
+        together.take(self.bvh.isa(), points, normal, &mut sums);
+        let half = sums.map(|sum| 0.5 * sum);
+        residuals(&half, &sums, &[true; POINTS], 0.5).0
+    }
+
+    /// One ray from each point of the facet side that `from` stands for, all along one direction.
+    #[inline]
+    fn shoot(
+        &mut self,
+        (from, points): (&Surface, &[Vec3; POINTS]),
+        direction: Vec3,
+        sums: &mut Sums,
+        backs: &mut [u32; POINTS],
+    ) {
+        let mut ahead = Ahead::default();
+        let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.leave(direction);
+        for ((n, sum), backs) in (0..POINTS as u32).zip(sums).zip(backs) {
+            *sum += match self.bvh.closest_of(&mut ahead, n, POINTS as u32, any) {
+                None => 1.0,
+                Some(hit) => match Surface::of_hit(self.scene, &hit) {
+                    None => {
+                        *backs += 1;
+                        0.0
+                    }
+                    Some(surface) => self.brightness(&surface),
+                },
+            };
+        }
+        self.traced += POINTS as u64;
+    }
+
+    /// What a facet may send, the sky sending 1: before light is known, facets are told apart by where they face.
+    #[inline]
+    fn brightness(&self, surface: &Surface) -> f64 {
+        let most = |values: &[f64]| values.iter().fold(0.0, |a: f64, &b| a.max(b));
+        if most(self.scene.emission(surface.material)) > 0.0 {
+            return 1.0;
+        }
+        let toward = Vec3::new(0.36, 0.48, 0.8);
+        // a mirror shows some of both
+        let mirrored = if most(self.scene.specular(surface.material)) > 0.0 { 0.5 } else { 0.0 };
+        0.5 * most(self.scene.diffuse(surface.material)) * (1.0 + surface.normal.dot(toward)) + mirrored
+    }
+}
+
+/// The middle of a quarter's quarter, in weights of corners 1 and 2.
+fn middle(point: usize) -> (f64, f64) {
+    out_of(point / QUARTERS, out_of(point % QUARTERS, (1.0 / 3.0, 1.0 / 3.0)))
+}
+
+/// Unevenness by the product of both halves' residuals about their best linear functions over the points seen, and the
+/// noise of a half in it. `half` and `all` are sums over the first half's and all rays; a half has `rays` rays.
+#[inline(never)]
+fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64, f64) {
+    let count = seen.iter().filter(|s| **s).count() as f64;
+    if count == 0.0 {
+        return (0.0, 0.0);
+    }
+    // moments about the middle of the points seen: of the weights x, y, of the halves' means a, b
+    let mut means = [0.0; 4];
+    let row = |point: usize| {
+        let (x, y) = middle(point);
+        [x, y, half.at(point) / rays, (all.at(point) - half.at(point)) / rays]
+    };
+    let points = || (0..POINTS).filter(|p| seen.at(*p));
+    points().for_each(|p| means.iter_mut().zip(row(p)).for_each(|(m, v)| *m += v / count));
+    let mut products = [[0.0; 4]; 4];
+    for p in points() {
+        let mut r = row(p);
+        r.iter_mut().zip(means).for_each(|(v, m)| *v -= m);
+        for (line, a) in products.iter_mut().zip(r) {
+            line.iter_mut().zip(r).for_each(|(s, b)| *s += a * b);
+        }
+    }
+    let [[xx, xy, xa, xb], [_, yy, ya, yb], [_, _, aa, ab], [_, _, _, bb]] = products;
+    let determinant = xx * yy - xy * xy;
+    let hidden = 1.0 - count / POINTS as f64;
+    if hidden > 0.0 {
+        // no linear function is known where quarters are hidden, nor what the points beside their edge see
+        let freedom = (count - 1.0).max(1.0);
+        let cross = ab / freedom + EDGE * hidden * (1.0 - hidden);
+        return (cross, (0.5 * (aa + bb) - ab).max(0.0) / freedom);
+    }
+    let explained = |(x, y): (f64, f64), (z, w): (f64, f64)| {
+        (yy * x * z - xy * (x * w + y * z) + xx * y * w) / determinant
+    };
+    let (a, b) = ((xa, ya), (xb, yb));
+    let cross = ab - explained(a, b);
+    let squares = aa - explained(a, a) + bb - explained(b, b);
+    let freedom = (count - 3.0).max(1.0);
+    (cross / freedom, (0.5 * squares - cross).max(0.0) / freedom)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_is_uneven_and_a_slope_is_not() {
+        let of = |f: fn(f64, f64) -> f64, error: f64| {
+            let mut sums = [[0.0; POINTS]; 2];
+            let [half, all] = &mut sums;
+            for (point, (half, all)) in half.iter_mut().zip(all).enumerate() {
+                let (x, y) = middle(point);
+                // errors of opposite signs in the halves
+                let noise = if point % 3 == 0 { error } else { 0.0 };
+                *half = 500.0 * (f(x, y) + noise);
+                *all = *half + 500.0 * (f(x, y) - noise);
+            }
+            residuals(&sums[0], &sums[1], &[true; POINTS], 500.0)
+        };
+        let (even, noise) = of(|x, y| 0.2 + 0.3 * x + 0.4 * y, 0.0);
+        assert!(even.abs() < 1e-15 && noise < 1e-15); // rounding
+        let (jump, _) = of(|x, _| if x < 0.3 { 1.0 } else { 0.1 }, 0.0);
+        assert!(jump > 0.03);
+        let (even, noise) = of(|x, _| 0.3 * x, 0.1);
+        assert!(noise > 1e-3 && even < 0.0, "noise of opposite signs is no unevenness: {even}");
+    }
+
+    #[test]
+    fn points_inside_bodies_do_not_count() {
+        let of = |inside: f64| {
+            let (mut sums, mut seen) = ([[0.0; POINTS]; 2], [true; POINTS]);
+            let [half, all] = &mut sums;
+            for (point, ((half, all), seen)) in half.iter_mut().zip(all).zip(&mut seen).enumerate() {
+                let (x, y) = middle(point);
+                *seen = x + y < 0.7;
+                *half = if *seen { 1.0 + x - y } else { inside };
+                *all = 2.0 * *half;
+            }
+            residuals(&sums[0], &sums[1], &seen, 1.0)
+        };
+        assert_eq!(of(0.0), of(9.0));
+        assert!(of(0.0).0 > 0.01, "but their edge does");
+    }
+
+    #[test]
+    fn the_least_errors_stay() {
+        let values = [1.0, 2.0, 4.0, 8.0, 100.0];
+        assert_eq!(threshold(&values, 200.0, 5), f64::INFINITY);
+        assert_eq!(threshold(&values, 1.0, 0), f64::INFINITY);
+        let within = threshold(&values, 7.0, 5);
+        assert!(within > 2.0 && within <= 4.0);
+        let few = threshold(&values, 7.0, 1);
+        assert!(few > 8.0 && few <= 100.0);
+    }
+}

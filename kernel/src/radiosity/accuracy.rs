@@ -1,0 +1,209 @@
+//! How wrong the diffuse solution is expected to be: from differences between independent resolutions, under the light
+//! that there is.
+//!
+//! Every row of the coupling was traced in two halves, from four quarters of its element. What both halves see of the
+//! solved radiances differs by their rays' noise; what the middle quarter sees beside the mean of the others is what
+//! the linear function over the element leaves out, and the product of both halves' values for it is free of noise's
+//! bias.
+//!
+//! The halves' differences go on from element to element as light does: in rooms that reflect much, small errors of
+//! all rows add up.
+
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut, pieces, span};
+use crate::base::math::narrow;
+use crate::base::simd::{self, Isa, LaneTask, Lanes};
+use crate::coupling::{BLOCKED, ENCLOSED, RowView};
+use crate::radiosity::System;
+use crate::scene::sky::Sky;
+use crate::scene::{MAX_BANDS, Scene};
+use core::ops::Range;
+
+/// Variance of a linear function through what three quarters see, over that of the mean of all four: of independent
+/// quarters 1 + 8/3.
+const LINEAR: f64 = 11.0 / 3.0;
+
+/// Mean square departure from a linear function over that of the middle from the corners: 1.1 for a parabola, 1.6 for
+/// quadratic functions at large, 1.8 beside walls, 2.4 for jumps.
+const DEPARTURE: f64 = 2.0;
+
+/// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
+const UNSEEN: f64 = 0.5;
+
+/// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
+const MOST_CARRIED: u32 = 12;
+
+/// What the products of [`carry`] leave out, where so few leave out so little.
+const LEFT_OUT: f64 = 5e-3;
+
+/// How often [`carry`] is called, and the products that it and [`rows`] make: each brings at most q of
+/// what the one before did, q the largest diffuse reflectance and what mirrors add to it.
+pub fn carried(scene: &Scene<'_>) -> u32 {
+    let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
+    let (mut products, mut rest) = (1, q);
+    while rest > LEFT_OUT && products < MOST_CARRIED {
+        rest *= q;
+        products += 1;
+    }
+    products
+}
+
+/// What a row's own rays tell of one band, relative to the reference radiance.
+pub type Own = [f32; 2];
+
+/// For the rows of `range`, one of each band: half the difference between the halves of the row's rays, irradiance over
+/// pi; and the expected squared error of the linear function over the element. `radiance` is the solved diffuse
+/// radiance of all unknowns.
+///
+/// # Errors
+/// [`Error::Length`] for an output of another length.
+pub fn differences(
+    system: &System<'_>,
+    radiance: &[f64],
+    reference: &[f64],
+    range: Range<usize>,
+    out: &mut [Own],
+) -> Result<(), Error> {
+    let bands = system.shape.bands;
+    check(out.len(), span(&range) * bands)?;
+    simd::run_lanes(Isa::detect(), Differences { system, radiance, reference, range, out });
+    Ok(())
+}
+
+/// [`differences`] at work.
+struct Differences<'a, 'o> {
+    system: &'a System<'a>,
+    radiance: &'a [f64],
+    reference: &'a [f64],
+    range: Range<usize>,
+    out: &'o mut [Own],
+}
+
+impl LaneTask for Differences<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Differences { system, radiance, reference, range, out } = self;
+        let bands = system.shape.bands.clamp(1, MAX_BANDS);
+        // one by one: a pair of them would be made elsewhere on the stack and copied
+        let mut checks = [[0.0; 4]; MAX_BANDS];
+        let mut light = [0.0; MAX_BANDS];
+        let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
+        for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+            sums.fill([0.0; 4]);
+            add_targets(&row, radiance, sums);
+            if let Some(sky) = &system.light.sky {
+                add_sky(&row, sky, lanes, light, sums);
+            }
+            for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
+                let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
+                let [first, second, one, other] = sums.map(|s| scale * s);
+                let noise = LINEAR * (first * first + second * second);
+                *out = [narrow(first + second), narrow(noise + DEPARTURE * (one * other).max(0.0))];
+            }
+        }
+    }
+}
+
+/// How wrong the radiances of the rows of `range` are by their differences and by what others' errors (`from`, as this
+/// gives them; empty: none) bring them: times pi, one value of each band, relative to the reference radiance.
+///
+/// # Errors
+/// [`Error::Length`] for an output of another length.
+pub fn carry(
+    system: &System<'_>,
+    differences: &[Own],
+    from: &[f32],
+    range: Range<usize>,
+    out: &mut [f32],
+) -> Result<(), Error> {
+    let bands = system.shape.bands.clamp(1, MAX_BANDS);
+    check(out.len(), span(&range) * bands)?;
+    let mut sums = [0.0; MAX_BANDS];
+    let sums = sums.head_mut(bands);
+    for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+        if !from.is_empty() {
+            row.gather(from, sums);
+        }
+        let diffuse = system.scene.diffuse(system.scene.material(system.elements.facet_of(unknown).0));
+        let own = differences.part(unknown * bands..(unknown + 1) * bands);
+        for (out, ((sum, [own, _]), rho)) in out.iter_mut().zip(sums.iter().zip(own).zip(diffuse)) {
+            *out = narrow(rho * (f64::from(*own) + sum));
+        }
+    }
+    Ok(())
+}
+
+/// Expected squared error of the irradiance over pi of each unknown in `range`, relative to the reference radiance, in
+/// the band where it is largest: where noise is all there is, up to three times that. From the [`differences`] of all
+/// unknowns and what [`carry`] came to. An element inside a body has its stand-in's.
+///
+/// # Errors
+/// [`Error::Length`] for an output of another length.
+pub fn rows(
+    system: &System<'_>,
+    differences: &[Own],
+    carried: &[f32],
+    range: Range<usize>,
+    out: &mut [f32],
+) -> Result<(), Error> {
+    let bands = system.shape.bands.clamp(1, MAX_BANDS);
+    check(out.len(), span(&range))?;
+    let mut sums = [0.0; MAX_BANDS];
+    let sums = sums.head_mut(bands);
+    let unseen = if is_dark(system) { 0.0 } else { UNSEEN };
+    for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
+        let near = system.stand_in(unknown, &row);
+        let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
+        let (unknown, row) = known.unwrap_or((unknown, row));
+        row.gather(carried, sums);
+        let own = differences.part(unknown * bands..(unknown + 1) * bands);
+        let rays = f64::from(row.row.rays);
+        let unseen = if rays > 0.0 { (unseen / rays) * (unseen / rays) } else { 0.0 };
+        let square = |(&[_, own], &carried): (&Own, &f64)| unseen + f64::from(own) + carried * carried;
+        *out = narrow(own.iter().zip(&*sums).map(square).fold(0.0, f64::max));
+    }
+    Ok(())
+}
+
+/// Whether there is no light at all.
+fn is_dark(system: &System<'_>) -> bool {
+    let shines = |material: usize| system.scene.emission(material).iter().any(|l| *l > 0.0);
+    system.light.sky.is_none() && system.light.sun.is_none() && !(0..system.scene.materials()).any(shines)
+}
+
+fn check(given: usize, expected: usize) -> Result<(), Error> {
+    if given == expected { Ok(()) } else { Err(Error::Length { what: "errors", expected, given }) }
+}
+
+/// Adds a row's checks, each times the light it stands for, by band.
+#[inline(always)]
+fn add(sums: &mut [[f64; 4]], checks: [f32; 4], lights: impl Iterator<Item = f64>) {
+    for (sum, light) in sums.iter_mut().zip(lights) {
+        sum.iter_mut().zip(checks).for_each(|(s, c)| *s += light * f64::from(c));
+    }
+}
+
+#[inline(always)]
+fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
+    let bands = sums.len();
+    for record in row.targets {
+        let start = record.unknown() * bands;
+        let seen = radiance.part(start..start + bands);
+        add(sums, record.checks, seen.iter().zip(row.products(record.word())).map(|(l, p)| l * p));
+    }
+}
+
+/// `light` has room for a value of each band.
+#[inline(always)]
+fn add_sky<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [[f64; 4]]) {
+    for bundle in row.escapes {
+        sky.sum(lanes, bundle.packed, light);
+        match bundle.word {
+            BLOCKED if row.row.state != ENCLOSED => light.iter_mut().for_each(|l| *l = -*l),
+            word => light.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
+        }
+        add(sums, bundle.checks, light.iter().copied());
+    }
+}

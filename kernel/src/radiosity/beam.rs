@@ -1,0 +1,301 @@
+//! Sunlight that mirrors throw onto diffuse facets.
+//!
+//! Each side of a mirror facet that faces the sun sends a share of its sunlight along mirror chains; what
+//! arrives at a diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row =
+//! facet * sides + side of the mirror, target = unknown, weight = irradiance per unit of the sun's normal
+//! irradiance. Energy is conserved: the weights times the targets' areas add up to the flux that leaves.
+//! A record also tells where the sun seems to stand ([`crate::radiosity::sun_image`]), so that images need not take these means.
+//! Error of an element that receives n of the rays: about n^-3/4 of its value.
+
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, clamp, reflect};
+use crate::base::qmc::{Sequence, hash2, triangle};
+use crate::coupling::element::Elements;
+use crate::coupling::rows::lobe_point;
+use crate::coupling::sink::Sink;
+use crate::coupling::word::EMPTY;
+use crate::coupling::{Coupling, Record, Row, TRACED};
+use crate::radiosity::direct::Shape;
+use crate::radiosity::sun_image::{Noting, pack};
+use crate::rays::bvh::Bvh;
+use crate::rays::ray::Ray;
+use crate::rays::surface::Surface;
+use crate::scene::sun::Sun;
+use crate::scene::{NO_MIRROR, Scene};
+use core::ops::Range;
+
+/// What beams follow from the tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BeamSettings {
+    /// Rays per unit of mirror area (scene coordinates) seen from the sun.
+    pub density: f64,
+    /// Chains end where the product of their mirrors falls below this.
+    pub cutoff: f64,
+    /// Chains meet at most this many mirrors.
+    pub mirrors: u32,
+}
+
+/// Fewest and most rays of one facet.
+const RAYS: (f64, f64) = (16.0, 65536.0);
+
+impl BeamSettings {
+    /// About `rays` rays in all, spread over the mirrors that face the sun by the area that it sees.
+    pub fn new(scene: &Scene<'_>, sun: &Sun<'_>, rays: f64, cutoff: f64, mirrors: u32) -> BeamSettings {
+        let mut area = 0.0;
+        for facet in 0..scene.facets() {
+            for side in 0..scene.sides() {
+                area += seen_area(scene, sun, facet, side);
+            }
+        }
+        BeamSettings { density: if area > 0.0 { rays / area } else { 0.0 }, cutoff, mirrors }
+    }
+}
+
+/// Records of a row at which those of the same element are added up for the first time.
+const FOLD: usize = 1024;
+
+/// About the records that one row needs while it grows: two for each ray, or twice as many as there are different ones.
+pub fn unmerged(scene: &Scene<'_>, elements: &Elements<'_>, settings: &BeamSettings) -> usize {
+    let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
+    let rays = (clamp(largest * settings.density, RAYS.0, RAYS.1) as usize).next_power_of_two();
+    (2 * rays).min(FOLD + elements.unknowns().saturating_mul(8))
+}
+
+/// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
+fn seen_area(scene: &Scene<'_>, sun: &Sun<'_>, facet: usize, side: usize) -> f64 {
+    if scene.mirror(scene.material(facet)) == NO_MIRROR {
+        return 0.0;
+    }
+    scene.areas().at(facet) * sun.cosine(scene.side_normal(facet, side))
+}
+
+/// Traces the beams of the mirror sides in `range` (facet * sides + side) into a block of `memory`, as
+/// [`crate::coupling::rows::fill`] does; returns the number of rows done.
+pub fn fill(
+    scene: &Scene<'_>,
+    bvh: &Bvh<'_>,
+    elements: &Elements<'_>,
+    sun: &Sun<'_>,
+    settings: &BeamSettings,
+    range: Range<usize>,
+    memory: &mut [u8],
+) -> Result<usize, Error> {
+    let given = memory.len();
+    let sink = Sink::new(&range, scene.bands(), false, memory)?;
+    let wanted = range.len();
+    let mut tracer = Tracer { scene, bvh, elements, sun, settings, sink };
+    for row in range {
+        if tracer.row(row).is_none() {
+            tracer.sink.drop_row();
+            break;
+        }
+    }
+    match tracer.sink.end() {
+        0 if wanted > 0 => Err(Error::BufferTooSmall { needed: given.saturating_mul(2), given }),
+        done => Ok(done),
+    }
+}
+
+struct Tracer<'a, 'm> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    elements: &'a Elements<'a>,
+    sun: &'a Sun<'a>,
+    settings: &'a BeamSettings,
+    sink: Sink<'m>,
+}
+
+impl Tracer<'_, '_> {
+    fn row(&mut self, row: usize) -> Option<()> {
+        let (facet, side) = (row / self.scene.sides().max(1), row % self.scene.sides().max(1));
+        let area = seen_area(self.scene, self.sun, facet, side);
+        if area <= 0.0 {
+            self.sink.end_row(Row::default(), Some, Record::join_beam);
+            return Some(());
+        }
+        let wanted = clamp(area * self.settings.density, RAYS.0, RAYS.1);
+        let rays = (wanted as u32).next_power_of_two();
+        let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
+        let mut stats = Row { state: TRACED, rays, ..Row::default() };
+        let mut fold = FOLD;
+        for first in (0..rays).step_by(BATCH) {
+            let end = rays.min(first + BATCH as u32);
+            for start in (first..end).step_by(GROUP) {
+                self.rays(facet, side, &sequence, start..end.min(start + GROUP as u32), &mut stats)?;
+            }
+            if self.sink.present() >= fold {
+                fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
+            }
+        }
+        let share = 1.0 / f64::from(rays);
+        let finish = |record: Record| Some(Record { weight: share * record.weight, ..record });
+        self.sink.end_row(stats, finish, Record::join_beam);
+        Some(())
+    }
+
+    /// The rays of these numbers, at most [`GROUP`], from mirror to mirror together.
+    fn rays(
+        &mut self,
+        facet: usize,
+        side: usize,
+        sequence: &Sequence,
+        numbers: Range<u32>,
+        stats: &mut Row,
+    ) -> Option<()> {
+        let (scene, bvh) = (self.scene, self.bvh);
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
+        let mut chains: [Option<Chain>; GROUP] = [None; GROUP];
+        let mut count = 0;
+        for index in numbers {
+            let (p, q) = sequence.pair(index, 0);
+            let (u, v) = triangle(p, q);
+            let surface = Surface::new(scene, facet, side, u, v);
+            let (s, t) = sequence.pair(index, 2);
+            let toward = self.sun.sample(s, t);
+            if toward.dot(surface.normal) > 0.0 {
+                // flux per unit of normal irradiance, the first cosine still to come
+                let (flux, word, arrival) = (scene.areas().at(facet), EMPTY, None);
+                let axis = (!scene.is_smooth()).then_some(-self.sun.direction());
+                let chain = Chain { index, surface, direction: -toward, flux, word, arrival, axis };
+                rays.set(count, surface.leave(toward));
+                chains.set(count, Some(chain));
+                count += 1;
+            }
+        }
+        let mut hidden = [false; GROUP];
+        bvh.occluded_many(rays.head(count), hidden.head_mut(count));
+        for (chain, _) in chains.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden) {
+            *chain = None;
+        }
+        let mut hits = [None; GROUP];
+        while count > 0 {
+            let mut left = 0;
+            for at in 0..count {
+                let Some(mut chain) = chains.at(at) else { continue };
+                if let Some(ray) = self.mirrored(&mut chain, sequence)? {
+                    rays.set(left, ray);
+                    chains.set(left, Some(chain));
+                    left += 1;
+                }
+            }
+            bvh.closest_many(rays.head(left), hits.head_mut(left));
+            for (chain, hit) in chains.head_mut(left).iter_mut().zip(hits) {
+                let surface = hit.and_then(|hit| {
+                    stats.chain_rays += 1;
+                    Surface::of_hit(scene, &hit)
+                });
+                *chain = chain.zip(surface).map(|(chain, surface)| Chain { surface, ..chain });
+                if let Some(chain) = chain {
+                    self.arrive(chain)?;
+                }
+            }
+            count = left;
+        }
+        Some(())
+    }
+
+    /// The ray by which a chain goes on from its mirror, if there is one and it matters.
+    fn mirrored(&mut self, chain: &mut Chain, sequence: &Sequence) -> Option<Option<Ray>> {
+        let (scene, surface) = (self.scene, chain.surface);
+        let Some(mirror) = surface.mirror(scene) else { return Some(None) };
+        let depth = self.sink.words.get(chain.word).depth;
+        if depth >= self.settings.mirrors {
+            return Some(None);
+        }
+        chain.word = match self.sink.spell(chain.word, mirror.class, scene) {
+            Ok(next) => next,
+            Err(true) => return Some(None),
+            Err(false) => return None,
+        };
+        if self.sink.words.largest(chain.word) < self.settings.cutoff {
+            return Some(None);
+        }
+        let lobe = mirror.lobe.is_some();
+        chain.axis = chain.axis.filter(|_| !lobe).map(|axis| reflect(axis, surface.normal));
+        let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
+        let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
+        let flat = !lobe && !scene.is_smooth();
+        chain.flux *= share * turned(surface.normal, leaving, chain.arrival, flat);
+        (chain.direction, chain.arrival) = (leaving, Some(leaving));
+        Some(Some(surface.leave(leaving)))
+    }
+
+    /// Notes what a chain brings to the surface that it has met.
+    fn arrive(&mut self, chain: &Chain) -> Option<()> {
+        let Surface { facet, side, u, v, .. } = chain.surface;
+        let target = self.elements.locate(facet, side, u, v);
+        let area = self.scene.areas().at(facet) * self.elements.share(target.0);
+        let image = chain.axis.map_or(0, |axis| pack(-axis));
+        self.sink.push(Record::beam(target, chain.word, chain.flux / area, image))
+    }
+}
+
+/// Rays of a mirror after which records are folded.
+const BATCH: usize = 32;
+
+/// Rays that are traced together: they wait on the stack, which is small where there is no standard library.
+const GROUP: usize = if cfg!(feature = "std") { BATCH } else { 1 };
+
+/// Sunlight on its way from mirror to mirror.
+#[derive(Clone, Copy)]
+struct Chain {
+    /// Number of its ray.
+    index: u32,
+    /// What it has met.
+    surface: Surface,
+    direction: Vec3,
+    /// Per unit of the sun's normal irradiance.
+    flux: f64,
+    word: u16,
+    /// The direction in which it came from the mirror before.
+    arrival: Option<Vec3>,
+    /// The way of the light of the sun's middle, as long as flat mirrors turn it.
+    axis: Option<Vec3>,
+}
+
+/// By how much a beam's flux changes at a mirror beside its reflectance: a mirror keeps radiance, so the flux
+/// goes with the cosine at which it leaves over that at which it came (none yet for sunlight, whose flux per
+/// normal irradiance gets its first cosine here). 1 at a flat ideal mirror.
+fn turned(normal: Vec3, leaving: Vec3, arrival: Option<Vec3>, flat: bool) -> f64 {
+    let out = leaving.dot(normal).max(0.0);
+    match arrival {
+        None => out,
+        Some(_) if flat => 1.0,
+        Some(d) => out / (-d.dot(normal)).max(1e-6),
+    }
+}
+
+/// Adds the beams to the irradiance table of all unknowns, in the order of the mirrors, and notes which suns they come
+/// from; what falls on an element falls on the part of it that is not inside a body.
+pub fn add(
+    beams: &Coupling<'_>,
+    (coupling, elements): (&Coupling<'_>, &Elements<'_>),
+    sun: &Sun<'_>,
+    shape: Shape,
+    table: &mut [f64],
+    images: &mut Noting<'_>,
+) {
+    for (_, row) in beams.rows(0..beams.unknowns()) {
+        for record in row.targets {
+            let (unknown, image) = (record.unknown(), record.image());
+            if image != 0 {
+                images.note(elements.facet_sides(), elements.facet_side(unknown), image);
+            }
+            let exposed = f64::from(coupling.row(unknown).exposed);
+            if exposed == 0.0 {
+                continue;
+            }
+            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.word()), l)) {
+                let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
+                for (band, (e, product)) in mean.iter_mut().zip(row.products(record.word())).enumerate() {
+                    let irradiance = sun.irradiance(band) * product * (record.weight / exposed);
+                    *e += irradiance;
+                    if image != 0 {
+                        images.add(shape, (unknown, level), band, irradiance);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! What sky and sun give each element before any diffuse reflection, straight and by way of mirrors.
+//!
+//! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
+//! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
+
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut, copy, pieces, span};
+use crate::base::math::{PI, Vec3};
+use crate::base::qmc::{Sequence, hash2, triangle};
+use crate::base::simd::{self, Isa, LaneTask, Lanes};
+use crate::coupling::element::Elements;
+use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
+use crate::rays::bvh::Bvh;
+use crate::rays::ray::Ray;
+use crate::rays::surface::Surface;
+use crate::scene::sky::Sky;
+use crate::scene::sun::Sun;
+use crate::scene::{MAX_BANDS, Scene};
+use core::ops::Range;
+
+/// Shape of the tables that hold irradiances: for each unknown, each level and each of mean and two gradients,
+/// one value per band. Level l counts light reflected at most l times; one level alone counts all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Levels: 1, or `max_bounces` + 1.
+    pub levels: usize,
+    /// Spectral bands.
+    pub bands: usize,
+}
+
+impl Shape {
+    /// Values of one unknown.
+    #[inline(always)]
+    pub fn stride(self) -> usize {
+        self.levels * 3 * self.bands
+    }
+
+    /// Where a level's values of an unknown stand in the table: mean, first gradient, second gradient.
+    #[inline(always)]
+    pub fn at(self, unknown: usize, level: usize) -> Range<usize> {
+        let start = unknown * self.stride() + level * 3 * self.bands;
+        start..start + 3 * self.bands
+    }
+
+    /// True when light of `depth` reflections counts on `level`.
+    #[inline(always)]
+    pub fn counts(self, depth: u32, level: usize) -> bool {
+        self.levels == 1 || depth as usize <= level
+    }
+}
+
+/// Irradiance by the sky on the sides of the elements in `range`, straight and by way of mirrors, written to
+/// `out` (the part of the table that belongs to the range).
+///
+/// The unobstructed irradiance of the facet's plane, less what is blocked, plus what mirrors bring (where most is
+/// blocked, the sum over what is open): facets that nothing blocks get it to `relative_error`, and in a uniform sky the
+/// sum over targets and sky is exact.
+///
+/// # Errors
+/// [`Error::Length`] for a table of the wrong size; [`Error::Mismatch`] where the sky is not uniform and the
+/// coupling kept no directions.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "each is a stage's result or a range of it, as in the other stages"
+)]
+pub fn sky_rows(
+    scene: &Scene<'_>,
+    elements: &Elements<'_>,
+    coupling: &Coupling<'_>,
+    sky: &Sky<'_>,
+    relative_error: f64,
+    range: Range<usize>,
+    shape: Shape,
+    out: &mut [f64],
+) -> Result<(), Error> {
+    let expected = span(&range) * shape.stride();
+    if out.len() != expected {
+        return Err(Error::Length { what: "irradiance table", expected, given: out.len() });
+    }
+    if !sky.is_uniform() && !coupling.is_directional() {
+        return Err(Error::Mismatch { what: "coupling without directions" });
+    }
+    simd::run_lanes(
+        Isa::detect(),
+        SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out },
+    );
+    Ok(())
+}
+
+/// [`sky_rows`] at work.
+struct SkyRows<'a, 'o> {
+    scene: &'a Scene<'a>,
+    elements: &'a Elements<'a>,
+    coupling: &'a Coupling<'a>,
+    sky: &'a Sky<'a>,
+    relative_error: f64,
+    range: Range<usize>,
+    shape: Shape,
+    out: &'o mut [f64],
+}
+
+impl LaneTask for SkyRows<'_, '_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out } = self;
+        let bands = shape.bands.clamp(1, MAX_BANDS);
+        let (mut unobstructed, mut sum) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
+        let (unobstructed, sum) = (unobstructed.head_mut(bands), sum.head_mut(bands));
+        let mut of = None;
+        for ((unknown, row), values) in coupling.rows(range).zip(pieces(out, shape.stride())) {
+            values.fill(0.0);
+            if row.row.state == ABSENT {
+                continue;
+            }
+            if row.row.state != ENCLOSED {
+                let own = elements.facet_of(unknown);
+                if of != Some(own) {
+                    sky.irradiance(scene.side_normal(own.0, own.1), relative_error, unobstructed);
+                    of = Some(own);
+                }
+                pieces(values, 3 * bands).for_each(|part| copy(part, unobstructed));
+            }
+            add_escapes(&row, sky, lanes, shape, sum, values);
+            let means = pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands));
+            means.for_each(|e| *e = e.max(0.0));
+        }
+    }
+}
+
+/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors; `sum` has room for a value
+/// of each band.
+#[inline(always)]
+fn add_escapes<L: Lanes>(
+    row: &RowView<'_>,
+    sky: &Sky<'_>,
+    lanes: L,
+    shape: Shape,
+    sum: &mut [f64],
+    values: &mut [f64],
+) {
+    let bands = sum.len();
+    for bundle in row.escapes {
+        sky.sum(lanes, bundle.packed, sum);
+        match bundle.word {
+            BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
+            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= PI * product),
+        }
+        let depth = row.depth(bundle.word);
+        let [a, b] = bundle.gradient.map(f64::from);
+        for (_, part) in
+            pieces(values, 3 * bands).enumerate().filter(|(level, _)| shape.counts(depth, *level))
+        {
+            for (part, factor) in pieces(part, bands).zip([bundle.weight, a, b]) {
+                part.iter_mut().zip(&*sum).for_each(|(to, l)| *to += l * factor);
+            }
+        }
+    }
+}
+
+/// Points on an element at which the sun is tested: all of the first share agree, or all are taken.
+const SUN_POINTS: (u32, u32) = (16, 128);
+
+/// Rays toward the sun that are traced together: they wait on the stack, which is small where there is no standard library.
+const SUN_BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
+
+/// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
+/// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
+pub fn sun_rows(
+    scene: &Scene<'_>,
+    bvh: &Bvh<'_>,
+    elements: &Elements<'_>,
+    coupling: &Coupling<'_>,
+    sun: &Sun<'_>,
+    range: Range<usize>,
+    out: &mut [f64],
+) -> Result<u64, Error> {
+    if out.len() != span(&range) {
+        return Err(Error::Length { what: "sun table", expected: span(&range), given: out.len() });
+    }
+    let mut rays = 0;
+    let mut toward = [Ray::new(Vec3::ZERO, Vec3::Z); SUN_BATCH];
+    let (mut shares, mut hidden) = ([0.0; SUN_BATCH], [false; SUN_BATCH]);
+    for ((unknown, row), value) in coupling.rows(range).zip(out) {
+        let (facet, side) = elements.facet_of(unknown);
+        let normal = scene.side_normal(facet, side);
+        let cosine = sun.cosine(normal);
+        *value = 0.0;
+        if row.row.state == ABSENT || cosine <= 0.0 {
+            continue;
+        }
+        if row.row.state == OPEN {
+            *value = cosine;
+            continue;
+        }
+        let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
+        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
+        while count < goal {
+            let batch = (goal - count).min(SUN_BATCH as u32);
+            let mut kept = 0;
+            for n in count..count + batch {
+                let (p, q) = sequence.pair(n, 0);
+                let (a, b) = triangle(p, q);
+                let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
+                let (s, t) = sequence.pair(n, 2);
+                let ray = Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t));
+                let share = sun.share(ray.direction, normal);
+                if share > 0.0 {
+                    toward.set(kept, ray);
+                    shares.set(kept, share);
+                    kept += 1;
+                }
+            }
+            bvh.occluded_many(toward.head(kept), hidden.head_mut(kept));
+            for (share, hidden) in shares.head(kept).iter().zip(&hidden) {
+                all += share;
+                lit += if *hidden { 0.0 } else { *share };
+            }
+            count += batch;
+            if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
+                goal = SUN_POINTS.1;
+            }
+        }
+        rays += u64::from(count);
+        let share = if all > 0.0 { lit / all } else { 0.0 };
+        let exposed = f64::from(row.row.exposed);
+        // inside a body: what falls there matters to nothing
+        *value = if exposed > 0.0 { cosine * (share / exposed).min(1.0) } else { 0.0 };
+    }
+    Ok(rays)
+}
+
+/// Adds irradiances (`bands` values an unknown) to the means in a table of one level.
+pub fn add(irradiance: &[f64], shape: Shape, table: &mut [f64]) {
+    for (unknown, to) in pieces(table, shape.stride()).enumerate() {
+        let from = irradiance.part(unknown * shape.bands..(unknown + 1) * shape.bands);
+        to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+    }
+}

@@ -1,0 +1,6 @@
+//! Rays and what they meet: the tree of facets, first hits, surfaces at hits and the rays that leave them.
+
+pub mod bvh;
+pub(crate) mod inside;
+pub mod ray;
+pub mod surface;

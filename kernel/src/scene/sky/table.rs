@@ -1,0 +1,355 @@
+//! Skies given by samples, bilinear in elevation and azimuth.
+
+use super::{LARGEST, SkyTable};
+use crate::base::error::{Error, Field};
+use crate::base::index::{Index, parts};
+use crate::base::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, clamp, cos, fabs, floor, sin, sqrt, unit};
+use crate::base::quadrature::rule;
+
+/// A validated table in the frame (x toward azimuth 0, y, up).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Table<'a> {
+    rows: usize,
+    columns: usize,
+    bands: usize,
+    samples: &'a [f32],
+    x: Vec3,
+    y: Vec3,
+    up: Vec3,
+}
+
+/// One elevation of the quadrature: the plane's cosine there is `constant + swing cos(azimuth - normal's)`,
+/// positive within `arc` (cosine `cos_arc`) of the normal's azimuth.
+#[derive(Clone, Copy, Default)]
+struct Ring {
+    constant: f64,
+    swing: f64,
+    /// Quadrature weight times the cosine of elevation, shared out to the upper and the lower row of samples.
+    shares: [f64; 2],
+    arc: f64,
+    cos_arc: f64,
+    sin_arc: f64,
+}
+
+/// Rings of one panel between two rows of samples: up to 16 points.
+struct Rings {
+    rings: [Ring; 16],
+    count: usize,
+}
+
+/// From one column's centre to the next: azimuth from the normal's, and the cosines and sines of the ends.
+#[derive(Clone, Copy)]
+struct Cell {
+    start: f64,
+    size: f64,
+    cos: [f64; 2],
+    sin: [f64; 2],
+}
+
+impl<'a> Table<'a> {
+    pub(super) fn new(input: &SkyTable<'a>, factors: &[f64], up: Vec3) -> Result<Table<'a>, Error> {
+        let field = Field::SkyTable;
+        for steps in [input.rows, input.columns] {
+            if steps == 0 {
+                return Err(Error::Range { field, band: 0, value: 0.0 });
+            }
+        }
+        if input.bands != 1 && input.bands != factors.len() {
+            return Err(Error::LightBandCount { field, expected: factors.len(), given: input.bands });
+        }
+        let expected = input.rows.saturating_mul(input.columns).saturating_mul(input.bands);
+        if input.radiance.len() != expected {
+            return Err(Error::Length { what: "sky table", expected, given: input.radiance.len() });
+        }
+        let factor = |band: usize| match input.bands {
+            1 => factors.iter().fold(0.0, |largest: f64, factor| largest.max(*factor)),
+            _ => factors.get(band).copied().unwrap_or(0.0),
+        };
+        for sample in parts(input.radiance, input.bands) {
+            for (band, &value) in sample.iter().enumerate() {
+                let value = f64::from(value);
+                if !(value >= 0.0 && value.is_finite()) {
+                    return Err(Error::Range { field, band, value });
+                }
+                if value * factor(band) > LARGEST {
+                    return Err(Error::Range { field, band, value: value * factor(band) });
+                }
+            }
+        }
+        let x = azimuth_zero(input.azimuth_zero, up)?;
+        Ok(Table {
+            rows: input.rows,
+            columns: input.columns,
+            bands: input.bands,
+            samples: input.radiance,
+            x,
+            y: up.cross(x),
+            up,
+        })
+    }
+
+    fn row(&self, row: usize) -> &'a [f32] {
+        let length = self.columns * self.bands;
+        self.samples.get(row * length..(row + 1) * length).unwrap_or(&[])
+    }
+
+    /// Interpolated samples toward the unit vector `direction`, per band.
+    pub(super) fn radiance(&self, direction: Vec3, out: &mut [f64]) {
+        let (x, y, z) = (direction.dot(self.x), direction.dot(self.y), direction.dot(self.up));
+        let zenith = atan2(sqrt(x * x + y * y), z);
+        let down = clamp(zenith / PI * self.rows as f64 - 0.5, 0.0, (self.rows - 1) as f64);
+        let along = atan2(y, x) / TAU * self.columns as f64 - 0.5;
+        let (top, left) = (floor(down), floor(along));
+        let (t, s) = (down - top, along - left);
+        let top = top as usize;
+        let left = (left as isize).rem_euclid((self.columns as isize).max(1)) as usize;
+        let right = (left + 1) % self.columns.max(1);
+        let (upper, lower) = (self.row(top), self.row((top + 1).min(self.rows - 1)));
+        let corners = [
+            (upper, left, (1.0 - t) * (1.0 - s)),
+            (upper, right, (1.0 - t) * s),
+            (lower, left, t * (1.0 - s)),
+            (lower, right, t * s),
+        ];
+        self.each_band(out, |sums| {
+            for (row, column, weight) in corners {
+                for (sum, &sample) in sums.iter_mut().zip(row.iter().skip(column * self.bands)) {
+                    *sum += weight * f64::from(sample);
+                }
+            }
+        });
+    }
+
+    /// Largest sample per band.
+    pub(super) fn largest(&self, out: &mut [f64]) {
+        self.each_band(out, |sums| {
+            for sample in parts(self.samples, self.bands) {
+                for (largest, &value) in sums.iter_mut().zip(sample) {
+                    *largest = largest.max(f64::from(value));
+                }
+            }
+        });
+    }
+
+    /// Lets `add` sum into zeros, one per band of the table, and spreads a single band over all of `out`.
+    fn each_band(&self, out: &mut [f64], mut add: impl FnMut(&mut [f64])) {
+        if self.bands == 1 {
+            let mut sum = [0.0];
+            add(&mut sum);
+            out.fill(sum[0]);
+        } else {
+            let count = self.bands.min(out.len());
+            let sums = out.get_mut(..count).unwrap_or_default();
+            sums.fill(0.0);
+            add(sums);
+        }
+    }
+
+    /// Irradiance of a plane that faces the unit vector `normal`, per band, for a factor of 1.
+    ///
+    /// Integrates the bilinear interpolant in azimuth exactly (it is linear there, times the plane's cosine),
+    /// from end to end of the arc above the plane, and in elevation by Gauss-Legendre rules between rows, split
+    /// where the plane's horizon turns. Error: for cells wholly above the plane below 1e-9 of their part (4
+    /// points, 8 rows or more) or 1e-12 (16, where `relative_error` < 1e-4 or rows are fewer). On the plane's
+    /// horizon the rule meets kinks where the horizon enters and leaves a cell and where it turns; of what a
+    /// single bright sample gives a plane that faces it, the error so left is at most 2e-4 (4 points) or 1e-5
+    /// (16), measured on 8 x 16 samples with all normals, and falls with the second power of the cells' size.
+    /// Time in proportion to the number of samples, about 10 ns each.
+    // apart: its rings do not burden the stack of other skies
+    #[inline(never)]
+    pub(super) fn irradiance(&self, normal: Vec3, relative_error: f64, out: &mut [f64]) {
+        let points = if relative_error >= 1e-4 && self.rows >= 8 { 4 } else { 16 };
+        let (x, y) = (normal.dot(self.x), normal.dot(self.y));
+        let (across, height) = (sqrt(x * x + y * y), normal.dot(self.up));
+        let size = TAU / self.columns as f64;
+        let moments = [(|x| 1.0 - x) as fn(f64) -> f64, |x| x].map(|hat| {
+            let (nodes, weights) = rule(16);
+            nodes.iter().zip(weights).fold([0.0; 2], |[c, s], (&x, &w)| {
+                [c + size * w * hat(x) * cos(size * x), s + size * w * hat(x) * sin(size * x)]
+            })
+        });
+        let mut start = 0.5 * size - atan2(y, x);
+        start -= TAU * floor((start + PI) / TAU);
+        let mut rings = Rings { rings: [Ring::default(); 16], count: 0 };
+        // the plane's horizon lies between these elevations
+        let turn = atan2(across, fabs(height));
+        self.each_band(out, |sums| {
+            for gap in 0..=self.rows {
+                let rows = [self.row(gap.saturating_sub(1)), self.row(gap.min(self.rows - 1))];
+                let (top, bottom) = self.gap(gap);
+                // one panel at a time: all rings of a gap would burden the stack
+                let bounds = [top, turn.min(top).max(bottom), (-turn).min(top).max(bottom), bottom];
+                for panel in bounds.windows(2) {
+                    rings.fill((top, bottom), panel, across, height, points);
+                    if rings.outer() > 0.0 {
+                        self.add_gap(&rings, rows, start, size, &moments, sums);
+                    }
+                }
+            }
+        });
+    }
+
+    /// Elevations between which gap `gap` lies; 0: between the zenith and the first row; `rows`: between the last row and
+    /// the nadir.
+    fn gap(&self, gap: usize) -> (f64, f64) {
+        let step = PI / self.rows as f64;
+        let top = if gap == 0 { FRAC_PI_2 } else { FRAC_PI_2 - (gap as f64 - 0.5) * step };
+        let bottom = if gap == self.rows { -FRAC_PI_2 } else { FRAC_PI_2 - (gap as f64 + 0.5) * step };
+        (top, bottom)
+    }
+
+    /// Adds the part of the cells between two rows of samples in which rings are.
+    fn add_gap(
+        &self,
+        rings: &Rings,
+        rows: [&[f32]; 2],
+        first: f64,
+        size: f64,
+        moments: &[[f64; 2]; 2],
+        sums: &mut [f64],
+    ) {
+        let (inner, outer) = (rings.inner(), rings.outer());
+        let whole = rings.whole();
+        let (turn_cos, turn_sin) = (cos(size), sin(size));
+        let (mut angle, mut ahead) = (first, (cos(first), sin(first)));
+        for column in 0..self.columns {
+            let here = ahead;
+            ahead = (here.0 * turn_cos - here.1 * turn_sin, here.1 * turn_cos + here.0 * turn_sin);
+            let (start, end) = (angle, angle + size);
+            angle = if end >= PI { end - TAU } else { end };
+            // corner weights: upper left, upper right, lower left, lower right
+            let weights = if inner >= PI || (start >= -inner && end <= inner) {
+                let cosines = moments.map(|[c, s]| here.0 * c - here.1 * s);
+                let corner = |row: [f64; 2], cosine: f64| row[0] * 0.5 * size + row[1] * cosine;
+                let ([upper, lower], [left, right]) = (whole, cosines);
+                [corner(upper, left), corner(upper, right), corner(lower, left), corner(lower, right)]
+            } else if end <= -outer || (start >= outer && end <= TAU - outer) {
+                continue;
+            } else {
+                rings.part(&Cell { start, size, cos: [here.0, ahead.0], sin: [here.1, ahead.1] })
+            };
+            let next = if column + 1 == self.columns { 0 } else { column + 1 };
+            let corner = |row: usize, column: usize| {
+                rows.at(row).get(column * self.bands..(column + 1) * self.bands).unwrap_or(&[])
+            };
+            let upper = corner(0, column).iter().zip(corner(0, next));
+            let samples = upper.zip(corner(1, column).iter().zip(corner(1, next)));
+            for (sum, ((&a, &b), (&c, &d))) in sums.iter_mut().zip(samples) {
+                *sum += weights[0] * f64::from(a)
+                    + weights[1] * f64::from(b)
+                    + weights[2] * f64::from(c)
+                    + weights[3] * f64::from(d);
+            }
+        }
+    }
+}
+
+impl Rings {
+    /// The rings of a panel, two elevations in a gap from `top` to `bottom`, for a normal of the given horizontal length
+    /// and height.
+    fn fill(&mut self, (top, bottom): (f64, f64), panel: &[f64], across: f64, height: f64, points: usize) {
+        self.count = 0;
+        let &[from, to] = panel else { return };
+        if from <= to {
+            return;
+        }
+        let (nodes, weights) = rule(points);
+        for ((x, weight), ring) in nodes.iter().zip(weights).zip(&mut self.rings) {
+            let elevation = from + (to - from) * x;
+            let below = (top - elevation) / (top - bottom);
+            let cosine = cos(elevation);
+            let weight = (from - to) * weight * cosine;
+            let shares = [weight * (1.0 - below), weight * below];
+            *ring = Ring::new(height * sin(elevation), across * cosine, shares);
+            self.count += 1;
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &Ring> {
+        self.rings.iter().take(self.count)
+    }
+
+    /// Within this of the normal's azimuth every ring is above the plane.
+    fn inner(&self) -> f64 {
+        self.iter().fold(PI, |least, ring| least.min(ring.arc))
+    }
+
+    /// Beyond this no ring is.
+    fn outer(&self) -> f64 {
+        self.iter().fold(0.0, |most, ring| most.max(ring.arc))
+    }
+
+    /// Sums over the rings of constant and swing, for the upper and the lower row.
+    fn whole(&self) -> [[f64; 2]; 2] {
+        [0, 1].map(|row: usize| {
+            self.iter().fold([0.0; 2], |[constant, swing], ring| {
+                let share = ring.shares.at(row);
+                [constant + share * ring.constant, swing + share * ring.swing]
+            })
+        })
+    }
+
+    /// Corner weights of a cell that the plane's horizon may cross. The arc above the plane appears around
+    /// azimuth 0 and again a turn later, where a cell may end.
+    fn part(&self, cell: &Cell) -> [f64; 4] {
+        let mut weights = [0.0; 4];
+        for ring in self.iter() {
+            for turn in [0.0, TAU] {
+                let [left, right] = ring.hats(cell, turn);
+                weights[0] += ring.shares[0] * left;
+                weights[1] += ring.shares[0] * right;
+                weights[2] += ring.shares[1] * left;
+                weights[3] += ring.shares[1] * right;
+            }
+        }
+        weights
+    }
+}
+
+impl Ring {
+    fn new(constant: f64, swing: f64, shares: [f64; 2]) -> Ring {
+        let (arc, cos_arc) = if constant >= swing {
+            (PI, -1.0)
+        } else if constant <= -swing {
+            (0.0, 1.0)
+        } else {
+            let cosine = -constant / swing;
+            (acos(cosine), cosine)
+        };
+        let sin_arc = sqrt((1.0 - cos_arc) * (1.0 + cos_arc));
+        Ring { constant, swing, shares, arc, cos_arc, sin_arc }
+    }
+
+    /// Integrals over the part of the cell within `arc` of azimuth `turn`, of the cosine times the two linear
+    /// weights that are 1 at the cell's start and at its end.
+    fn hats(&self, cell: &Cell, turn: f64) -> [f64; 2] {
+        let (mut from, mut to) = ((cell.start, cell.cos[0], cell.sin[0]), (0.0, cell.cos[1], cell.sin[1]));
+        to.0 = cell.start + cell.size;
+        if turn - self.arc > from.0 {
+            from = (turn - self.arc, self.cos_arc, -self.sin_arc);
+        }
+        if turn + self.arc < to.0 {
+            to = (turn + self.arc, self.cos_arc, self.sin_arc);
+        }
+        if from.0 >= to.0 {
+            return [0.0; 2];
+        }
+        let (a, b) = (from.0 - cell.start, to.0 - cell.start);
+        let plain = self.constant * (b - a) + self.swing * (to.2 - from.2);
+        let first =
+            0.5 * self.constant * (b * b - a * a) + self.swing * (b * to.2 - a * from.2 + to.1 - from.1);
+        let right = first / cell.size;
+        [plain - right, right]
+    }
+}
+
+/// Unit vector of azimuth 0, perpendicular to `up`.
+fn azimuth_zero(given: Option<[f64; 3]>, up: Vec3) -> Result<Vec3, Error> {
+    // off the vertical by more than 1e-9, so that the projection has seven digits or more
+    let project = |v: Vec3| unit(v - up * v.dot(up)).filter(|_| v.cross(up).length_squared() > 1e-18);
+    match given {
+        Some(given) => unit(Vec3::from_array(given)).and_then(project),
+        None => project(Vec3::X).or_else(|| project(Vec3::Y)),
+    }
+    .ok_or(Error::Direction { field: Field::SkyAzimuthZero })
+}

@@ -1,0 +1,92 @@
+//! What the stages follow from the one number that the caller states.
+//!
+//! Every layer over the kernel (the owning one, the C interface, bare metal) decides here, so that all compute the
+//! same bits.
+
+use crate::base::error::{Error, Field};
+use crate::base::math::{clamp, pow};
+use crate::coupling::rows::RowSettings;
+use crate::coupling::word::LONGEST;
+use crate::radiosity::beam::BeamSettings;
+use crate::radiosity::direct::Shape;
+use crate::radiosity::sun_image;
+use crate::scene::Scene;
+use crate::scene::sun::Sun;
+use crate::view::chain::ChainSettings;
+
+/// Refuses a tolerance outside 1e-6 to 0.1.
+pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {
+    if (1e-6..=0.1).contains(&tolerance) {
+        Ok(())
+    } else {
+        Err(Error::Range { field: Field::Tolerance, band: 0, value: tolerance })
+    }
+}
+
+/// Records that a row of the coupling may need while it grows: a ray leaves one where it is blocked and one at each
+/// facet that it meets.
+pub fn unmerged(rows: &RowSettings) -> usize {
+    4 * rows.most_rays() as usize
+}
+
+/// Whether planes are compared ([`crate::coupling::facing::Facing`]): closed forms are for rows that keep no directions of the sky.
+pub fn planes(scene: &Scene<'_>, rows: &RowSettings) -> bool {
+    !rows.directional && (rows.all || scene.largest_diffuse() > 0.0)
+}
+
+/// The most probing rays of a point: all points of a triangle together have as many as a row of the coupling.
+pub fn probing(rows: &RowSettings) -> u32 {
+    (rows.rays / 16).clamp(16, crate::coupling::subdivide::MOST_RAYS)
+}
+
+/// Relative error of the sky's irradiance on a plane.
+pub fn sky_accuracy(tolerance: f64) -> f64 {
+    (0.05 * tolerance).max(1e-9)
+}
+
+/// Orders of reflection are kept apart only where their number is bounded, and small; one level counts all.
+pub fn shape(max_bounces: Option<u32>, bands: usize) -> Shape {
+    let levels = max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);
+    Shape { levels, bands }
+}
+
+/// How the beams that mirrors throw are traced; `None` where the scene has no use for them.
+pub fn beams(
+    scene: &Scene<'_>,
+    sun: &Sun<'_>,
+    tolerance: f64,
+    max_bounces: Option<u32>,
+    all_irradiances: bool,
+) -> Option<BeamSettings> {
+    let diffuse = scene.largest_diffuse() > 0.0 || all_irradiances;
+    if scene.largest_specular() == 0.0 || !diffuse || max_bounces == Some(0) {
+        return None;
+    }
+    let rays = clamp(100.0 / tolerance, 32768.0, 1e8);
+    let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
+    Some(BeamSettings::new(scene, sun, rays, sun_image::CUTOFF * tolerance, mirrors))
+}
+
+/// Elements of which so many tolerances of error are expected are mended by rays from points in every image: few are.
+const GATHER: f64 = 3.0;
+
+/// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for that
+/// as another round of a coupling that took `rays`, made for the solution's tolerance, the second of the two.
+pub fn chains((tolerance, solution): (f64, f64), max_bounces: Option<u32>, rays: u64) -> ChainSettings {
+    let growth = (solution / tolerance) * (solution / tolerance);
+    ChainSettings {
+        cutoff: 0.05 * tolerance,
+        max_bounces,
+        tolerance,
+        sky_error: sky_accuracy(tolerance),
+        gather: GATHER,
+        rays: (rays as f64 * 4.0 * growth) as u64,
+        solution,
+        pixel: (f64::INFINITY, 0.0),
+    }
+}
+
+/// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.
+pub fn signature_cells(tolerance: f64) -> usize {
+    (pow(0.5 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
+}

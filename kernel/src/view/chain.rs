@@ -1,0 +1,682 @@
+//! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
+//! before it, and the sky where the chain leaves the object.
+
+mod crowd;
+mod gather;
+mod outlook;
+mod sunlight;
+
+use crowd::{CROWDED, Surroundings};
+pub(crate) use gather::GATHERS;
+use gather::{Gathered, Spot};
+pub(crate) use outlook::{Outlook, Way};
+
+use crate::base::arena::plain_table;
+use crate::base::index::{Index, IndexMut, copy};
+use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
+use crate::base::qmc::{Sequence, hash2};
+use crate::coupling::element::{Elements, Local};
+use crate::radiosity::direct::Shape;
+use crate::radiosity::sun_image::SunImages;
+use crate::rays::bvh::Bvh;
+use crate::rays::ray::{Hit, Ray};
+use crate::rays::surface::{Mirror, Surface};
+use crate::scene::light::Light;
+use crate::scene::{MAX_BANDS, Scene};
+use crate::view::camera::Camera;
+use outlook::Toward;
+
+/// How far chains are followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChainSettings {
+    /// Chains end where what they can still bring falls below this share of the reference radiance.
+    pub cutoff: f64,
+    /// Light reflected more often does not count; `None`: by `cutoff` alone.
+    pub max_bounces: Option<u32>,
+    /// Share of the reference radiance that a sampled lobe or penumbra may be wrong by.
+    pub tolerance: f64,
+    /// Relative error of the sky's irradiance on a plane.
+    pub sky_error: f64,
+    /// Where more than so many tolerances of error are expected of an element, rays from the point itself find what arrives
+    /// there.
+    pub gather: f64,
+    /// Where mending all pixels is expected to take at most so many rays, all are.
+    pub rays: u64,
+    /// Tolerance of the solution.
+    pub solution: f64,
+    /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
+    pub pixel: (f64, f64),
+}
+
+/// [`ChainSettings::gather`] where all pixels of an image may take rays.
+const GATHER_ALL: f64 = 0.6;
+
+impl ChainSettings {
+    /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
+    /// elements are mended.
+    pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
+        let all = camera.columns() * camera.rows();
+        let each = gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));
+        let affords = |pixels: f64| pixels * each <= self.rays as f64;
+        // counting them takes a look at every facet
+        let counts = GATHERS && self.solution > self.tolerance && scene.facets() <= all;
+        let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
+            GATHER_ALL
+        } else {
+            // most of it would have to be mended, for which a finer solution costs less: what a solution leaves at worst
+            self.gather * (self.solution / self.tolerance).max(1.0)
+        };
+        let area = camera.pixel_area();
+        ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }
+    }
+
+    /// The same for sums over so many rays that errors of single elements count little.
+    pub(crate) fn of_sums(self) -> ChainSettings {
+        ChainSettings { gather: f64::INFINITY, ..self }
+    }
+}
+
+/// A solved scene: what the radiance along any ray follows from.
+#[derive(Clone, Copy, Debug)]
+pub struct Solved<'a> {
+    /// The scene.
+    pub scene: &'a Scene<'a>,
+    /// Its facets' tree.
+    pub bvh: &'a Bvh<'a>,
+    /// Its elements.
+    pub elements: &'a Elements<'a>,
+    /// The light.
+    pub light: &'a Light<'a>,
+    /// Irradiance without the sun's direct part and that of its images: mean and gradients of each element side.
+    pub irradiance: &'a [f64],
+    /// Images of the sun in flat mirrors; what they throw is not in `irradiance`.
+    pub images: SunImages<'a>,
+    /// Shape of `irradiance`.
+    pub shape: Shape,
+    /// Expected squared error of each unknown's irradiance over pi, relative to the reference radiance.
+    pub variance: &'a [f32],
+    /// Reference radiance, one value per band.
+    pub reference: &'a [f64],
+    /// Largest radiance that any ray can see, relative to the reference radiance, over all bands.
+    pub brightest: f64,
+    /// How far chains are followed.
+    pub settings: ChainSettings,
+}
+
+plain_table! {
+    /// The three terms of eq. (11) along a ray, one value per band each.
+    pub struct Terms {
+        /// Diffuse radiance of the first facet.
+        pub diffuse: [f64; MAX_BANDS],
+        /// Sky and sun by way of mirrors, or straight where the ray meets nothing.
+        pub mirror_sky: [f64; MAX_BANDS],
+        /// Diffuse radiance of other facets by way of mirrors.
+        pub mirror_diffuse: [f64; MAX_BANDS],
+    }
+}
+
+plain_table! {
+    /// What a chain needs while it is followed, of any content: too large for small stacks.
+    pub struct Work {
+        /// Product of the reflectances along the chain, and along a ray of a lobe.
+        pub through: [[f64; MAX_BANDS]; 2],
+        /// Sums over a lobe's rays.
+        pub sums: Terms,
+        /// Sums of their squares.
+        pub squares: [f64; MAX_BANDS],
+        /// The sums before the latest ray.
+        pub before: [f64; MAX_BANDS],
+        /// What an image of the sun brings, and the product of the reflectances on the way to it.
+        pub images: [[f64; MAX_BANDS]; 2],
+        /// What rays from a point bring.
+        pub gathered: Gathered,
+    }
+}
+
+impl Work {
+    /// All zero.
+    pub const ZERO: Work = Work {
+        through: [[0.0; MAX_BANDS]; 2],
+        sums: Terms::ZERO,
+        squares: [0.0; MAX_BANDS],
+        before: [0.0; MAX_BANDS],
+        images: [[0.0; MAX_BANDS]; 2],
+        gathered: Gathered::ZERO,
+    };
+}
+
+impl Terms {
+    /// All zero.
+    pub const ZERO: Terms =
+        Terms { diffuse: [0.0; MAX_BANDS], mirror_sky: [0.0; MAX_BANDS], mirror_diffuse: [0.0; MAX_BANDS] };
+
+    /// Sets the first `bands` values to zero.
+    #[inline]
+    pub fn clear(&mut self, bands: usize) {
+        if bands == 1 {
+            // three calls of memset otherwise
+            (self.diffuse[0], self.mirror_sky[0], self.mirror_diffuse[0]) = (0.0, 0.0, 0.0);
+            return;
+        }
+        self.diffuse.head_mut(bands).fill(0.0);
+        self.mirror_sky.head_mut(bands).fill(0.0);
+        self.mirror_diffuse.head_mut(bands).fill(0.0);
+    }
+
+    /// Adds the first `bands` values of `next`.
+    pub fn add(&mut self, next: &Terms, bands: usize) {
+        let pairs = [
+            (&mut self.diffuse, &next.diffuse),
+            (&mut self.mirror_sky, &next.mirror_sky),
+            (&mut self.mirror_diffuse, &next.mirror_diffuse),
+        ];
+        for (to, from) in pairs {
+            to.iter_mut().zip(from).take(bands).for_each(|(to, from)| *to += from);
+        }
+    }
+
+    /// Radiance in one band.
+    #[inline]
+    pub fn sum(&self, band: usize) -> f64 {
+        self.diffuse.at(band) + self.mirror_sky.at(band) + self.mirror_diffuse.at(band)
+    }
+}
+
+/// What a ray met besides its radiance.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Path {
+    /// True where the first ray met the object.
+    pub object: bool,
+    /// Rays traced beyond the first.
+    pub rays: u32,
+    /// Most that chains cut before their end could still have brought, relative to the reference radiance.
+    pub tail: f64,
+    /// Expected squared error from the diffuse solution, relative to the reference radiance.
+    pub variance: f64,
+    /// Expected error from sampling lobes, relative to the reference radiance.
+    pub noise: f64,
+    /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
+    pub sampled: bool,
+}
+
+/// Which ray of an image it is, so that lobes and penumbrae of different rays are sampled apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sample {
+    /// A ray that stands for itself: lobes and penumbrae are integrated.
+    Alone(u32),
+    /// A ray that stands for itself unless it meets lobes or penumbrae ([`Path::sampled`]): then it is one of many
+    /// that are wanted.
+    Glance(u32),
+    /// Ray number `index` of those that `seed` names and whose mean counts: one point of the sun's disc and one ray of
+    /// each lobe. Coordinates 2 to 5 of the sequence `seed` choose them; 0 and 1 are for the place in the pixel.
+    OneOf {
+        /// Names the rays.
+        seed: u32,
+        /// This ray among them.
+        index: u32,
+    },
+}
+
+impl Sample {
+    /// A number for the sequences of one ray.
+    fn seed(self) -> u32 {
+        match self {
+            Sample::Alone(seed) | Sample::Glance(seed) => seed,
+            Sample::OneOf { seed, index } => hash2(seed, index + 1),
+        }
+    }
+
+    /// Turns by which the rays of a lobe's set are rotated, so that sets that count together differ.
+    fn turn(self, set: u32) -> f64 {
+        let index = match self {
+            Sample::Alone(_) | Sample::Glance(_) => 0,
+            Sample::OneOf { index, .. } => index,
+        };
+        let (turn, _) = Sequence::new(0x10be).pair(hash2(index, set) & 0xffff, 0);
+        if index == 0 && set == 0 { 0.0 } else { turn }
+    }
+
+    /// The point of the unit square that chooses the ray of lobe number `lobe` of a chain, the first to branch being
+    /// number 1.
+    ///
+    /// Rays that count together are spread over the square: at the first lobe by the sequence that chooses their other
+    /// points, too; at the second by multiples of powers of the plastic number, which together with the first lobe's
+    /// sunflower fill four dimensions more evenly than nets whose count is no power of two; beyond at random.
+    fn lobe_point(self, lobe: u32) -> (f64, f64) {
+        let (seed, index) = match self {
+            Sample::Alone(seed) | Sample::Glance(seed) => (seed, 0),
+            Sample::OneOf { seed, index } => (seed, index),
+        };
+        if lobe == 1 {
+            return Sequence::new(seed).pair(index & 0xffff, 4);
+        }
+        let sequence = Sequence::new(hash2(seed, lobe));
+        if lobe != 2 {
+            return sequence.pair(hash2(index, lobe) & 0xffff, 0);
+        }
+        let (a, b) = sequence.pair(0, 0);
+        let (x, y) = (a + f64::from(index) * PLASTIC.0, b + f64::from(index) * PLASTIC.1);
+        (x - floor(x), y - floor(y))
+    }
+}
+
+/// How a ray is followed: which one it is, and what is known of what stands before facets.
+struct How<'w, 'm> {
+    sample: Sample,
+    outlook: &'w mut Outlook<'m>,
+    /// Whether the first lobe ends it where the ray stands for itself.
+    branches: bool,
+}
+
+/// A chain on its way.
+struct Leg<'w> {
+    ray: Ray,
+    /// Product of the mirror reflectances so far, per band.
+    through: &'w mut [f64; MAX_BANDS],
+    /// Mirrors met.
+    mirrors: u32,
+    /// Lobes among them.
+    lobes: u32,
+    /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
+    lobe: bool,
+    /// Length of the way up to its ray.
+    far: f64,
+    /// True where the sun's disc does not count.
+    sunless: bool,
+    /// For the sun's images.
+    images: &'w mut [[f64; MAX_BANDS]; 2],
+    /// For rays from a point; none where it is such a ray itself.
+    gathered: Option<&'w mut Gathered>,
+}
+
+/// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
+const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
+
+/// Error of the mean of n rays of a lobe whose radiances have the standard deviation s: 1.2 s n^-0.6, and 0.09 rho/n
+/// for what lies between them. In the study of two cylinders (tests/gloss.rs) that is 1 to 1.8 times the true error
+/// for 1 to 1000 rays.
+const LOBE_ERROR: f64 = 1.2;
+const LOBE_POWER: f64 = 0.6;
+const BETWEEN: f64 = 0.09;
+
+/// Rays of a lobe's first set, times rho over the tolerance.
+const FIRST_RAYS: f64 = 0.24;
+
+/// A second set brings a lobe's expected error down to this many tolerances: lobes whose rays disagree fill less than
+/// a third of the pixels, and all pixels' root mean square is to meet the tolerance.
+const LOBE_GOAL: f64 = 1.5;
+
+/// Fewest and most rays of one lobe.
+const FEWEST_LOBE_RAYS: u32 = 4;
+const MOST_LOBE_RAYS: f64 = 1024.0;
+
+/// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
+const MOST_CLOSED: f64 = 0.5;
+
+/// The rays of one lobe so far: sums over them.
+struct Fan<'w> {
+    terms: &'w mut Terms,
+    path: Path,
+    /// Sum of the squared radiances of each band.
+    squares: &'w mut [f64; MAX_BANDS],
+    before: &'w mut [f64; MAX_BANDS],
+    /// Product of the reflectances along the latest ray.
+    through: &'w mut [f64; MAX_BANDS],
+    count: u32,
+}
+
+impl Fan<'_> {
+    /// Standard deviation of a ray's radiance over the reference radiance, the largest of all bands.
+    fn spread(&self, reference: &[f64]) -> f64 {
+        let n = f64::from(self.count.max(1));
+        let mut largest: f64 = 0.0;
+        for (band, (&square, &reference)) in self.squares.iter().zip(reference).enumerate() {
+            let mean = self.terms.sum(band) / n;
+            let variance = square / n - mean * mean;
+            // below: rounding of equal rays
+            if reference > 0.0 && variance > 1e-12 * mean * mean {
+                largest = largest.max(sqrt(variance) / reference);
+            }
+        }
+        largest
+    }
+
+    /// Expected error of the mean over the reference radiance; `through` is what a radiance of 1 brings.
+    #[inline(never)]
+    fn error(&self, reference: &[f64], through: f64) -> f64 {
+        let n = f64::from(self.count.max(1));
+        let (seen, between) =
+            (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), BETWEEN * through / n);
+        sqrt(seen * seen + between * between)
+    }
+
+    /// Adds the mean of all rays.
+    #[inline(never)]
+    fn mean_into(&self, terms: &mut Terms, path: &mut Path, bands: usize) {
+        let share = 1.0 / f64::from(self.count.max(1));
+        for band in 0..bands.min(MAX_BANDS) {
+            terms.diffuse[band] += share * self.terms.diffuse[band];
+            terms.mirror_sky[band] += share * self.terms.mirror_sky[band];
+            terms.mirror_diffuse[band] += share * self.terms.mirror_diffuse[band];
+        }
+        path.rays += self.path.rays;
+        path.tail += share * self.path.tail;
+        path.noise += share * self.path.noise;
+        // rays of a lobe meet the same elements: their errors are taken as one
+        path.variance += share * self.path.variance;
+    }
+}
+
+impl Solved<'_> {
+    /// Radiance against `ray`, added to `terms` (cleared by the caller).
+    pub fn radiance(&self, ray: &Ray, sample: Sample, terms: &mut Terms) -> Path {
+        self.radiance_at((ray, self.bvh.closest(ray)), sample, terms, &mut { Work::ZERO })
+    }
+
+    /// The same of a ray that is known to meet `hit` first, in the caller's memory.
+    pub fn radiance_at(
+        &self,
+        seen: (&Ray, Option<Hit>),
+        sample: Sample,
+        terms: &mut Terms,
+        work: &mut Work,
+    ) -> Path {
+        self.radiance_with(seen, sample, terms, work, &mut Outlook::none())
+    }
+
+    /// The same with what is known of what stands before facets: fewer rays, and the same bits.
+    pub(crate) fn radiance_with(
+        &self,
+        (ray, hit): (&Ray, Option<Hit>),
+        sample: Sample,
+        terms: &mut Terms,
+        work: &mut Work,
+        outlook: &mut Outlook<'_>,
+    ) -> Path {
+        let mut path = Path::default();
+        let Work { through: [through, next], sums, squares, before, images, gathered } = work;
+        through.head_mut(self.shape.bands).fill(1.0);
+        let (sunless, gathered) = (false, Some(gathered));
+        let mut leg = Leg {
+            ray: *ray,
+            through,
+            mirrors: 0,
+            lobes: 0,
+            lobe: false,
+            far: 0.0,
+            sunless,
+            images,
+            gathered,
+        };
+        let how = &mut How { sample, outlook, branches: true };
+        if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
+            let mut fan =
+                Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
+            self.branch(&mut leg, &lobe, how, terms, &mut path, &mut fan);
+        }
+        path
+    }
+
+    /// Follows a chain whose ray meets `hit` first to its end; or, where it may branch and the ray stands for itself, to
+    /// the first lobe. All other lobes take one ray.
+    fn follow(
+        &self,
+        leg: &mut Leg<'_>,
+        mut hit: Option<Hit>,
+        how: &mut How<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) -> Option<Hit> {
+        loop {
+            let Some(met) = hit else {
+                self.escape(leg, terms);
+                return None;
+            };
+            path.object |= leg.mirrors == 0;
+            leg.far += met.t;
+            let surface = Surface::of_hit(self.scene, &met)?;
+            self.add_diffuse(leg, &surface, how, terms, path);
+            let mirror = surface.mirror(self.scene)?;
+            if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
+                return None;
+            }
+            let specular = self.scene.specular(surface.material);
+            let bands = self.shape.bands;
+            let mut largest = 0.0;
+            for (through, rho) in leg.through.head_mut(bands).iter_mut().zip(specular) {
+                *through *= rho;
+                largest = f64::max(largest, *through);
+            }
+            if largest * self.brightest < self.settings.cutoff
+                || leg.mirrors as usize >= crate::coupling::word::LONGEST
+            {
+                path.tail += largest * self.brightest;
+                self.close(leg, terms);
+                return None;
+            }
+            leg.mirrors += 1;
+            leg.lobe = mirror.lobe.is_some();
+            match &mirror.lobe {
+                None => {
+                    let direction = surface.mirrored(self.scene, leg.ray.direction);
+                    leg.ray = surface.leave(direction);
+                    if leg.mirrors == 1
+                        && !leg.sunless
+                        && how.outlook.is_parallel()
+                        && !self.scene.is_smooth()
+                        && let Some(known) =
+                            how.outlook.before(self, &surface, Toward::Mirror, (direction, 0.0))
+                    {
+                        path.rays += u32::from(!known.is_empty());
+                        hit = self.bvh.closest_among(&leg.ray, known);
+                        continue;
+                    }
+                }
+                Some(_) => {
+                    self.add_sun_gloss(leg, &surface, &mirror, terms);
+                    leg.lobes += 1;
+                    let asked = self.scene.gloss_rays(surface.material).is_some();
+                    path.sampled |= !asked;
+                    if leg.lobes == 1 && how.branches && (asked || matches!(how.sample, Sample::Alone(_))) {
+                        return Some(met);
+                    }
+                    let (u, v) = how.sample.lobe_point(leg.lobes);
+                    self.turn(leg, &surface, &mirror, u, v);
+                }
+            }
+            path.rays += 1;
+            hit = self.bvh.closest(&leg.ray);
+        }
+    }
+
+    /// The rest of a chain that is not followed any more: it is taken to go on as it went so far, S + t S + t^2 S ... =
+    /// S/(1 - t) with the product t of its mirrors. Where all facets shine alike that is exact; it adds no more than
+    /// the part that the bound on the tail allows for. Lobes, which lose light at grazing angles, are left as they are.
+    #[cold]
+    fn close(&self, leg: &Leg, terms: &mut Terms) {
+        if leg.lobes > 0 {
+            return;
+        }
+        for (band, &through) in leg.through.head(self.shape.bands).iter().enumerate() {
+            if through <= MOST_CLOSED {
+                let all = terms.mirror_diffuse.at(band) + terms.sum(band) * through / (1.0 - through);
+                terms.mirror_diffuse.set(band, all);
+            }
+        }
+    }
+
+    /// One ray of a lobe, weighed with the lobe's albedo.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn turn(&self, leg: &mut Leg<'_>, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
+        let (direction, share) = surface.go_on(self.scene, mirror, leg.ray.direction, u, v);
+        leg.through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
+        leg.ray = surface.leave(direction);
+    }
+
+    /// Equal-energy rays of the visible lobe: as many as its material asks for; or a first set by the tolerance and,
+    /// where its rays disagree, a second.
+    #[inline(never)]
+    fn branch<'w>(
+        &self,
+        leg: &mut Leg<'w>,
+        hit: &Hit,
+        how: &mut How<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+        fan: &mut Fan<'w>,
+    ) {
+        let Some(surface) = Surface::of_hit(self.scene, hit) else { return };
+        let Some(lobe) = surface.mirror(self.scene).and_then(|mirror| mirror.lobe) else { return };
+        let bands = self.shape.bands;
+        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
+        let albedo = lobe.albedo(mirrored.dot(surface.normal));
+        leg.through.head_mut(bands).iter_mut().for_each(|t| *t *= albedo);
+        let largest = leg.through.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
+
+        let asked = self.scene.gloss_rays(surface.material);
+        let mut goal = asked.unwrap_or_else(|| self.first_rays(largest));
+        fan.terms.clear(bands);
+        fan.squares.head_mut(bands).fill(0.0);
+        for set in 0..2 {
+            let n = goal.saturating_sub(fan.count);
+            let turn = how.sample.turn(set);
+            for i in 0..n {
+                let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
+                self.add_ray(leg, surface.leave(direction), how, fan);
+            }
+            if asked.is_none() {
+                goal = self.all_rays(fan.spread(self.reference));
+            }
+        }
+        path.noise += fan.error(self.reference, largest);
+        fan.mean_into(terms, path, bands);
+    }
+
+    /// Rays of a lobe's first set, for a lobe whose light counts `through`: what they may miss between them is small
+    /// against the tolerance.
+    fn first_rays(&self, through: f64) -> u32 {
+        let wanted = FIRST_RAYS * through / self.settings.tolerance;
+        (wanted.min(MOST_LOBE_RAYS) as u32).max(FEWEST_LOBE_RAYS)
+    }
+
+    /// Rays of both sets, by the standard deviation of the first one's.
+    fn all_rays(&self, spread: f64) -> u32 {
+        let wanted = pow(LOBE_ERROR * spread / (LOBE_GOAL * self.settings.tolerance), 1.0 / LOBE_POWER);
+        wanted.min(MOST_LOBE_RAYS) as u32
+    }
+
+    /// One more ray of the lobe that `leg` has met, to its end. The leg is lent to the ray, as it is all that the stack has
+    /// room for, and given back but for its own ray.
+    fn add_ray<'w>(&self, leg: &mut Leg<'w>, ray: Ray, how: &mut How<'_, '_>, fan: &mut Fan<'w>) {
+        let bands = self.shape.bands;
+        fan.before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = fan.terms.sum(b));
+        copy(fan.through.head_mut(bands), leg.through.head(bands));
+        fan.path.rays += 1;
+        let sample = Sample::OneOf { seed: how.sample.seed(), index: fan.count };
+        let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
+        let hit = self.bvh.closest(&ray);
+        let (mirrors, lobes, far, gathered) = (leg.mirrors, leg.lobes, leg.far, leg.gathered.take());
+        (leg.ray, leg.lobe) = (ray, true);
+        core::mem::swap(&mut leg.through, &mut fan.through);
+        self.follow(leg, hit, &mut how, fan.terms, &mut fan.path);
+        core::mem::swap(&mut leg.through, &mut fan.through);
+        (leg.mirrors, leg.lobes, leg.far, leg.gathered) = (mirrors, lobes, far, gathered);
+        for (b, (square, before)) in fan.squares.iter_mut().zip(fan.before.iter()).enumerate().take(bands) {
+            let value = fan.terms.sum(b) - before;
+            *square += value * value;
+        }
+        fan.count += 1;
+    }
+
+    /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.
+    #[inline(never)]
+    fn escape(&self, leg: &Leg<'_>, terms: &mut Terms) {
+        let bands = self.shape.bands;
+        if let Some(sky) = &self.light.sky {
+            let mut radiance = [0.0; MAX_BANDS];
+            sky.radiance(leg.ray.direction, radiance.head_mut(bands));
+            let own = radiance.iter().zip(leg.through.iter()).take(bands);
+            terms.mirror_sky.iter_mut().zip(own).for_each(|(to, (l, through))| *to += through * l);
+        }
+        if let Some(sun) = &self.light.sun
+            && !sun.is_point()
+            && !leg.lobe
+            && !leg.sunless
+            && sun.contains(leg.ray.direction)
+        {
+            let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(bands);
+            own.enumerate().for_each(|(band, (to, through))| *to += through * sun.disc_radiance(band));
+        }
+    }
+
+    /// Diffuse radiance of a facet toward the chain.
+    #[inline]
+    fn add_diffuse(
+        &self,
+        leg: &mut Leg<'_>,
+        surface: &Surface,
+        how: &mut How<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
+        let bands = self.shape.bands;
+        let to = if leg.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
+        let emission = self.scene.emission(surface.material);
+        to.iter_mut()
+            .zip(leg.through.iter())
+            .zip(emission)
+            .for_each(|((to, through), own)| *to += through * own);
+        let diffuse = self.scene.diffuse(surface.material);
+        let level = match self.settings.max_bounces {
+            Some(most) if leg.mirrors >= most => return,
+            Some(most) if self.shape.levels > 1 => (most - leg.mirrors - 1) as usize,
+            _ => 0,
+        };
+        if diffuse.iter().all(|&d| d == 0.0) {
+            return;
+        }
+        let (unknown, local) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
+        let values =
+            self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
+        let sunlit = self.sun_cosine(leg, surface, how, path);
+        if !self.images.slots.is_empty() {
+            self.add_images(leg, surface, how, to, path);
+        }
+        let mut weight = 0.0;
+        for (through, rho) in leg.through.iter().zip(diffuse) {
+            weight = f64::max(weight, through * rho);
+        }
+        let mut variance = f64::from(self.variance.at(unknown));
+        let mut correction: &[f64] = &[];
+        if let Some(gathered) = leg.gathered.as_deref_mut()
+            && self.is_crowded(surface, unknown, leg.far, &mut gathered.surroundings)
+        {
+            variance = variance.max(CROWDED * CROWDED);
+        }
+        if self.wants_rays(surface, weight, variance)
+            && let Some(gathered) = leg.gathered.as_deref_mut()
+        {
+            let spot = Spot { surface, unknown, values, local, weight };
+            if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
+                (correction, variance) = (near, left);
+            }
+        }
+        for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
+            let mut irradiance = (linear(values, bands, local, band) + correction.at(band)).max(0.0);
+            if sunlit > 0.0
+                && let Some(sun) = &self.light.sun
+            {
+                irradiance += sunlit * sun.irradiance(band);
+            }
+            let share = through * rho;
+            *to += share * FRAC_1_PI * irradiance;
+        }
+        path.variance += weight * weight * variance;
+    }
+}
+
+/// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates.
+#[inline(always)]
+fn linear(values: &[f64], bands: usize, (a, b): Local, band: usize) -> f64 {
+    (values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band)).max(0.0)
+}

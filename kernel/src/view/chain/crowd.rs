@@ -1,0 +1,124 @@
+//! Where an element is far larger than what stands about a point of it, in a view that shows that: rows, whose rays leave
+//! all of an element, can have missed it, and its linear function tells nothing of its surroundings.
+
+use super::Solved;
+use super::gather::GATHERS;
+use crate::base::arena::plain_table;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, frame, sqrt};
+use crate::rays::bvh::Half;
+use crate::rays::surface::Surface;
+
+/// What irradiance over pi may be wrong by beside such things, relative to the reference radiance.
+pub(super) const CROWDED: f64 = 0.1;
+
+/// Pixels that an element fills from which on a view may show what its rays have missed.
+const PIXELS: f64 = 16.0;
+
+/// Facets are small up to this part of an element's size, and near up to so many times their own.
+const SMALL: f64 = 0.125;
+const NEAR: f64 = 5.0;
+
+/// Facets that are looked at. Where there are more, they count as small things if the element fills so many pixels that the
+/// view is of its surroundings, else as parts of larger ones.
+const MOST: u32 = 64;
+const LARGE: f64 = 256.0;
+
+/// Elements that are remembered.
+const KEPT: usize = if GATHERS { 64 } else { 0 };
+
+plain_table! {
+    /// What is known of the elements that were asked about latest.
+    pub struct Surroundings {
+        /// Each at its number's place: twice the unknown's number and 2, and 1 where small facets may stand near it.
+        pub known: [u64; KEPT],
+    }
+}
+
+impl Surroundings {
+    /// Nothing is known.
+    pub const ZERO: Surroundings = Surroundings { known: [0; KEPT] };
+}
+
+impl Solved<'_> {
+    /// Whether facets far smaller than its element stand near a point that a ray met after so long a way.
+    #[inline]
+    pub(super) fn is_crowded(
+        &self,
+        surface: &Surface,
+        unknown: usize,
+        far: f64,
+        known: &mut Surroundings,
+    ) -> bool {
+        let (area, per_square) = self.settings.pixel;
+        let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
+        let pixel = area + per_square * far * far;
+        let near = |many: bool| Near { normal: surface.normal, size: sqrt(element), many };
+        GATHERS
+            && element > PIXELS * pixel
+            && self.bvh.is_own()
+            && self.element_is_crowded(unknown, &near(true), known)
+            && self.small_near(&near(element > LARGE * pixel), &[surface.point; 3])
+    }
+
+    /// The same of any of its points, or because there are too many facets to tell.
+    #[inline]
+    fn element_is_crowded(&self, unknown: usize, near: &Near, known: &mut Surroundings) -> bool {
+        let (place, name) = (unknown % KEPT.max(1), 2 * (unknown as u64 + 1));
+        if known.known.at(place) & !1 != name {
+            let corners = self.elements.corners(self.scene, unknown / self.scene.sides());
+            let crowded = self.small_near(near, &corners);
+            known.known.set(place, name | u64::from(crowded));
+        }
+        known.known.at(place) & 1 != 0
+    }
+
+    /// Whether small facets stand before the points of a triangle, or of a point alone.
+    #[inline(never)]
+    fn small_near(&self, near: &Near, corners: &[Vec3; 3]) -> bool {
+        let (x, y) = frame(near.normal);
+        let reach = NEAR * SMALL * near.size;
+        let half = |normal: Vec3, below: f64| {
+            let least = corners.iter().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
+            Half { normal, height: least - below }
+        };
+        let halves = [
+            half(x, reach),
+            half(-x, reach),
+            half(y, reach),
+            half(-y, reach),
+            half(near.normal, 0.0),
+            half(-near.normal, reach),
+        ];
+        let alone = corners[0] == corners[1];
+        let (mut found, mut seen) = (false, 0);
+        self.bvh.within(&halves, |facet: u32| {
+            let Some((own, _)) = self.bvh.corners(facet) else { return true };
+            found = near.is_small(&own, corners[0], alone);
+            seen += 1;
+            !found && seen < MOST
+        });
+        found || near.many && seen >= MOST
+    }
+}
+
+/// An element's side.
+struct Near {
+    normal: Vec3,
+    /// Root of its area.
+    size: f64,
+    /// Whether many facets count as small ones.
+    many: bool,
+}
+
+impl Near {
+    /// Whether a facet is small beside it, stands before its plane and, where it is a point that counts, near.
+    fn is_small(&self, facet: &[Vec3; 3], point: Vec3, alone: bool) -> bool {
+        let [a, b, c] = facet.map(|corner| corner - point);
+        let own = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
+        let distance = (a + b + c).length_squared() / 9.0;
+        let above = [a, b, c].iter().any(|corner| corner.dot(self.normal) > 0.01 * sqrt(own));
+        let near = !alone || distance < NEAR * NEAR * own;
+        own < SMALL * SMALL * self.size * self.size && near && above
+    }
+}

@@ -1,0 +1,330 @@
+//! What arrives at a point, by rays from it, where the linear function over its element is not good enough: beside
+//! contacts, in corners that rows see too coarsely, on elements as large as their mesh.
+//!
+//! Rays are cosine-distributed, meet the solved radiances of what they see, straight or by way of mirrors, and go on in
+//! sets, each as large as all before, until their parts agree. Error of n rays whose light has the standard
+//! deviation s: about s n^-3/4. Where facets hide little of the sky, its irradiance is the exact one of the plane less what
+//! they hide.
+
+use super::{How, Leg, Path, Sample, Solved, Surroundings, Terms, linear};
+use crate::base::arena::plain_table;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{PI, Vec3, clamp, frame, pow, sqrt};
+use crate::base::qmc::{Sequence, cosine_direction, hash2};
+use crate::coupling::element::Local;
+use crate::rays::surface::Surface;
+use crate::scene::MAX_BANDS;
+
+/// Where the stack and memory are small nothing is gathered.
+pub(crate) const GATHERS: bool = cfg!(feature = "std");
+
+/// Bands for which there is room.
+const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
+
+/// Fewest and most rays from a point.
+const FEWEST: f64 = 128.0;
+const MOST: f64 = 65536.0;
+
+/// The most, in rays that half a bright hemisphere takes.
+const MOST_TIMES: f64 = 4.0;
+
+/// Parts of them.
+const PARTS: usize = 8;
+
+/// Error to reach, in tolerances.
+const GOAL: f64 = 0.5;
+
+/// Square of the error of the mean of all rays over what their parts' differences tell: what is small and bright, or dark,
+/// few of them see.
+const DOUBT: f64 = 3.0;
+
+/// Square of the error that what rays meet leaves in their mean, over the square of the mean of its expected errors: near
+/// elements err together.
+const ALIKE: f64 = 2.0;
+
+/// Elements of one pixel whose corrections are kept.
+const KEPT: usize = if GATHERS { 8 } else { 0 };
+
+plain_table! {
+    /// What rays from points have brought, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
+    pub struct Gathered {
+        /// Of the latest ray.
+        pub terms: [Terms; GATHERS as usize],
+        /// Product of the reflectances along it.
+        pub through: [[f64; MAX_BANDS]; GATHERS as usize],
+        /// The sky in its direction.
+        pub sky: [f64; BANDS],
+        /// Sums over the rays of each part: what they bring beyond the sky that they would see were nothing in their way.
+        pub beyond: [[f64; BANDS]; PARTS],
+        /// The same of that sky.
+        pub open: [[f64; BANDS]; PARTS],
+        /// By how much the elements that were gathered on differ from their linear functions.
+        pub corrections: [[f64; BANDS]; KEPT],
+        /// Expected squared errors of the irradiance over pi that are left.
+        pub errors: [f64; KEPT],
+        /// The unknowns.
+        pub unknowns: [u64; KEPT],
+        /// Sum of the expected errors of what the rays met.
+        pub carried: f64,
+        /// How many there are.
+        pub count: u64,
+        /// What stands about the latest element; none at first.
+        pub surroundings: Surroundings,
+    }
+}
+
+impl Gathered {
+    /// All zero.
+    pub const ZERO: Gathered = Gathered {
+        terms: [Terms::ZERO; GATHERS as usize],
+        through: [[0.0; MAX_BANDS]; GATHERS as usize],
+        sky: [0.0; BANDS],
+        beyond: [[0.0; BANDS]; PARTS],
+        open: [[0.0; BANDS]; PARTS],
+        corrections: [[0.0; BANDS]; KEPT],
+        errors: [0.0; KEPT],
+        unknowns: [0; KEPT],
+        carried: 0.0,
+        count: 0,
+        surroundings: Surroundings::ZERO,
+    };
+
+    /// Another image begins.
+    pub(crate) fn start(&mut self) {
+        self.surroundings = Surroundings::ZERO;
+    }
+
+    /// Another pixel begins.
+    #[inline]
+    pub fn forget(&mut self) {
+        self.count = 0;
+    }
+
+    /// Whether no element of the pixel was mended yet.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Where the correction of an unknown stands.
+    fn find(&self, unknown: usize) -> Option<usize> {
+        (0..(self.count as usize).min(KEPT)).find(|&at| self.unknowns.at(at) == unknown as u64)
+    }
+
+    /// Mean of one band over all of `rays` rays, with the exact sky or with theirs, and the square of its expected error.
+    fn mean(&self, band: usize, rays: u32, exact: bool) -> (f64, f64) {
+        let each = f64::from(rays) / PARTS as f64;
+        let open = if exact { 0.0 } else { 1.0 };
+        let of = |part: usize| {
+            let [beyond, open_sky] =
+                [&self.beyond, &self.open].map(|sums| sums.get(part).map_or(0.0, |p| p.at(band)));
+            (beyond + open * open_sky) / each
+        };
+        let mean = (0..PARTS).map(of).sum::<f64>() / PARTS as f64;
+        let squares = (0..PARTS).map(|part| (of(part) - mean) * (of(part) - mean)).sum::<f64>();
+        // as if they were independent: up to twice too much, since each fills what the others leave out
+        (mean, squares / (PARTS * (PARTS - 1)) as f64)
+    }
+
+    /// The square of the expected error of all bands, relative to the reference, the largest.
+    fn error(&self, reference: &[f64], rays: u32, exact: bool) -> f64 {
+        let bands = reference.iter().enumerate().filter(|(_, r)| **r > 0.0);
+        bands.map(|(band, r)| self.mean(band, rays, exact).1 / (r * r)).fold(0.0, f64::max)
+    }
+
+    /// Two parts each become one, and make room for two new ones.
+    fn halve(&mut self) {
+        for sums in [&mut self.beyond, &mut self.open] {
+            for part in 0..PARTS {
+                let [a, b] =
+                    [2 * part, 2 * part + 1].map(|from| sums.get(from).copied().unwrap_or([0.0; BANDS]));
+                let to = sums.get_mut(part).into_iter().flatten();
+                to.zip(a.iter().zip(&b)).for_each(|(to, (a, b))| *to = a + b);
+            }
+        }
+    }
+}
+
+/// Rays that settle what arrives at a point to an irradiance over pi of `tolerance` where half of a hemisphere is bright.
+pub(super) fn usual_rays(tolerance: f64) -> f64 {
+    pow(0.8 / tolerance, 4.0 / 3.0)
+}
+
+/// The point of which is asked what arrives there.
+pub(super) struct Spot<'a> {
+    pub surface: &'a Surface,
+    pub unknown: usize,
+    /// Irradiance of its element, mean and gradients, and where on it the point is.
+    pub values: &'a [f64],
+    pub local: Local,
+    /// What a radiance of 1 brings to the image.
+    pub weight: f64,
+}
+
+impl Solved<'_> {
+    /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
+    /// holds: not what lobes and curved mirrors throw of the sun, nor flat ones where there are too many, nor what is
+    /// reflected a limited number of times.
+    #[inline]
+    pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
+        let most = self.settings.gather * self.settings.tolerance;
+        self.gathers()
+            && weight * weight * variance > most * most
+            && (self.light.sun.is_none() || self.mirrors_are_flat() && self.knows_images(surface))
+    }
+
+    /// Whether any point may want rays.
+    #[inline]
+    pub(crate) fn gathers(&self) -> bool {
+        GATHERS && self.shape.levels == 1
+    }
+
+    fn knows_images(&self, surface: &Surface) -> bool {
+        let side = surface.facet * self.scene.sides() + surface.side;
+        self.images.are_known(self.elements.facet_sides(), side)
+    }
+
+    fn mirrors_are_flat(&self) -> bool {
+        let mut materials = 0..self.scene.materials();
+        self.scene.largest_specular() == 0.0
+            || !self.scene.is_smooth() && materials.all(|material| self.scene.gloss(material).is_none())
+    }
+
+    /// By how much the irradiance at a point differs from its element's, one value a band, and the expected squared error
+    /// that is left of irradiance over pi. What the sun brings straight or by way of flat mirrors is no part of it. Points
+    /// of one element in one pixel have the same correction.
+    #[inline(never)]
+    pub(super) fn gather<'g>(
+        &self,
+        spot: &Spot<'_>,
+        images: &mut [[f64; MAX_BANDS]; 2],
+        gathered: &'g mut Gathered,
+        how: &mut How<'_, '_>,
+        path: &mut Path,
+    ) -> Option<(&'g [f64], f64)> {
+        let place = match gathered.find(spot.unknown) {
+            Some(place) => place,
+            None => {
+                let place = gathered.count as usize;
+                if place >= KEPT {
+                    return None;
+                }
+                let (exact, rays) = self.trace(spot, images, gathered, how, path)?;
+                let error = self.note(spot, gathered, place, exact, rays);
+                gathered.errors.set(place, error);
+                gathered.unknowns.set(place, spot.unknown as u64);
+                gathered.count = place as u64 + 1;
+                place
+            }
+        };
+        Some((gathered.corrections.get(place)?, gathered.errors.at(place)))
+    }
+
+    /// Traces rays from a point until their parts agree; whether the exact sky serves better than theirs, and their number.
+    fn trace(
+        &self,
+        spot: &Spot<'_>,
+        images: &mut [[f64; MAX_BANDS]; 2],
+        gathered: &mut Gathered,
+        how: &mut How<'_, '_>,
+        path: &mut Path,
+    ) -> Option<(bool, u32)> {
+        // by where on its facet the point is, to some digits: a mesh that is moved keeps its rays
+        let Surface { facet, side, u, v, .. } = *spot.surface;
+        let [u, v] = [u, v].map(|x| (x * 65536.0) as u32);
+        let seed = hash2((facet * 2 + side) as u32, hash2(u, v));
+        let sequence = Sequence::new(seed);
+        let axes = frame(spot.surface.normal);
+        let tolerance = self.settings.tolerance / spot.weight;
+        let goal = (GOAL * tolerance) * (GOAL * tolerance);
+        let least = clamp(usual_rays(tolerance), FEWEST, MOST);
+        let most = clamp(MOST_TIMES * least, FEWEST, MOST) as u32;
+        gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
+        gathered.sky.fill(0.0);
+        gathered.carried = 0.0;
+        // fewer may all miss what little is bright, and agree
+        let (mut done, mut rays) = (0, (least as u32).next_power_of_two());
+        loop {
+            for index in done..rays {
+                let (p, q) = sequence.pair(index, 0);
+                let (a, b, c) = cosine_direction(p, q);
+                let direction = axes.0 * a + axes.1 * b + spot.surface.normal * c;
+                let part = (u64::from(index) * PARTS as u64 / u64::from(rays)) as usize;
+                let sample = Sample::OneOf { seed, index };
+                let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
+                self.add_direction((spot.surface, direction), part, images, gathered, &mut how, path)?;
+            }
+            let [exact, plain] = [true, false].map(|exact| gathered.error(self.reference, rays, exact));
+            if exact.min(plain) <= goal || 2 * rays > most {
+                return Some((exact <= plain, rays));
+            }
+            gathered.halve();
+            (done, rays) = (rays, 2 * rays);
+        }
+    }
+
+    /// One more ray from a point.
+    fn add_direction(
+        &self,
+        (surface, direction): (&Surface, Vec3),
+        part: usize,
+        images: &mut [[f64; MAX_BANDS]; 2],
+        gathered: &mut Gathered,
+        how: &mut How<'_, '_>,
+        path: &mut Path,
+    ) -> Option<()> {
+        let bands = self.shape.bands;
+        let ray = surface.leave(direction);
+        let hit = self.bvh.closest(&ray);
+        path.rays += 1;
+        let Gathered { terms, through, sky, beyond, open, carried, .. } = gathered;
+        let (terms, through) = (terms.first_mut()?, through.first_mut()?);
+        let (beyond, open) = (beyond.get_mut(part)?, open.get_mut(part)?);
+        if let Some(light) = &self.light.sky {
+            light.radiance(direction, sky.head_mut(bands));
+            open.iter_mut().zip(&*sky).take(bands).for_each(|(sum, l)| *sum += l);
+        }
+        if hit.is_none() {
+            return Some(());
+        }
+        terms.clear(bands);
+        through.head_mut(bands).fill(1.0);
+        let mut leg = Leg {
+            ray,
+            through,
+            mirrors: 0,
+            lobes: 0,
+            lobe: false,
+            far: 0.0,
+            sunless: true,
+            images,
+            gathered: None,
+        };
+        let mut inner = Path::default();
+        self.follow(&mut leg, hit, how, terms, &mut inner);
+        path.rays += inner.rays;
+        *carried += sqrt(inner.variance);
+        for (band, (sum, sky)) in beyond.iter_mut().zip(&*sky).enumerate().take(bands) {
+            *sum += terms.sum(band) - *sky;
+        }
+        Some(())
+    }
+
+    /// Notes the correction that rays from a point tell, and returns the expected squared error that is left.
+    fn note(&self, spot: &Spot<'_>, gathered: &mut Gathered, place: usize, exact: bool, rays: u32) -> f64 {
+        let bands = self.shape.bands.min(BANDS);
+        gathered.sky.fill(0.0);
+        if let (true, Some(sky)) = (exact, &self.light.sky) {
+            sky.irradiance(spot.surface.normal, self.settings.sky_error, gathered.sky.head_mut(bands));
+        }
+        for band in 0..bands {
+            let (mean, _) = gathered.mean(band, rays, exact);
+            let irradiance = PI * mean + gathered.sky.at(band);
+            if let Some(corrections) = gathered.corrections.get_mut(place) {
+                corrections.set(band, irradiance - linear(spot.values, bands, spot.local, band));
+            }
+        }
+        let carried = gathered.carried / f64::from(rays);
+        DOUBT * gathered.error(self.reference, rays, exact) + ALIKE * carried * carried
+    }
+}

@@ -1,0 +1,213 @@
+//! What may stand before a flat facet in one direction: nothing, mostly, and then rays that leave it need not be traced.
+
+use super::Solved;
+use crate::base::arena::plain_struct;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, reflect, sqrt};
+use crate::radiosity::sun_image::SAME;
+use crate::rays::bvh::Half;
+use crate::rays::surface::{OFFSET, Surface};
+use crate::scene::NO_MIRROR;
+
+/// Directions in which rays leave a facet's side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Toward {
+    /// The mirror direction of parallel rays.
+    Mirror,
+    /// The sun.
+    Sun,
+    /// An image of the sun.
+    Image(u32),
+}
+
+impl Toward {
+    /// A number other than 0.
+    fn number(self) -> u32 {
+        match self {
+            Toward::Mirror => 1,
+            Toward::Sun => 2,
+            Toward::Image(n) => 3 + n,
+        }
+    }
+}
+
+/// The most facets that a way names.
+const MOST: usize = 13;
+
+/// Ways that are remembered, a power of 2.
+const WAYS: usize = 512;
+
+/// In place of a count: too many.
+const CROWDED: u32 = u32::MAX;
+
+plain_struct! {
+    /// What may stand before one side of a facet in one direction.
+    pub struct Way {
+        /// Twice the facet and the side.
+        pub side: u32,
+        /// [`Toward::number`]; 0: an empty place.
+        pub toward: u32,
+        /// Facets that may be in the way, or [`CROWDED`]; toward an image of the sun: mirrors in the way that may show it.
+        pub count: u32,
+        /// Which.
+        pub facets: [u32; MOST],
+    }
+}
+
+/// Ways asked for lately; the same answers whether they are remembered or not.
+pub struct Outlook<'m> {
+    ways: &'m mut [Way],
+    /// Whether first rays are parallel.
+    parallel: bool,
+    /// Facets seen smaller than this are not worth a look along the mirror direction, and toward the sun: their few rays
+    /// cost less.
+    least: (f64, f64),
+}
+
+/// Rays that cost as much as a look.
+const WORTH: f64 = 8.0;
+
+impl<'m> Outlook<'m> {
+    /// Values of type [`Way`] in which an outlook works.
+    pub const ROOM: usize = WAYS;
+
+    /// For rays that are parallel to begin with, or not; `ways` holds [`Outlook::ROOM`], all zero, or none; parallel
+    /// rays have this area each, and so many follow them toward the sun.
+    pub fn new(ways: &'m mut [Way], parallel: bool, area: f64, sun: f64) -> Outlook<'m> {
+        let least = if parallel { WORTH * area } else { 0.0 };
+        Outlook { ways, parallel, least: (least, least / sun) }
+    }
+
+    /// No outlook: every ray is traced.
+    pub fn none() -> Outlook<'m> {
+        Outlook { ways: &mut [], parallel: false, least: (0.0, 0.0) }
+    }
+
+    /// Whether first rays are parallel and ways are known.
+    pub(super) fn is_parallel(&self) -> bool {
+        self.parallel && !self.ways.is_empty()
+    }
+
+    /// The facets that may stand in the way of rays that leave the flat `surface`'s side along `direction`, or along any
+    /// that is within an angle of sine `spread` of it (toward an image of the sun: mirrors among them that may show it);
+    /// `None` where that is not known, or they are many.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    pub(super) fn before(
+        &mut self,
+        solved: &Solved<'_>,
+        surface: &Surface,
+        toward: Toward,
+        (direction, spread): (Vec3, f64),
+    ) -> Option<&[u32]> {
+        let area = solved.scene.areas().at(surface.facet);
+        let small = match toward {
+            Toward::Mirror => area * surface.normal.dot(direction) < self.least.0,
+            _ => area < self.least.1,
+        };
+        if small {
+            return None;
+        }
+        let (side, toward) = (2 * surface.facet as u32 + surface.side as u32, toward.number());
+        let place = side.wrapping_mul(7).wrapping_add(toward.wrapping_mul(0x9e37_79b1)) as usize;
+        let way = self.ways.get_mut(place & (WAYS - 1))?;
+        if (way.side, way.toward) != (side, toward) {
+            *way = Way { side, toward, ..Way::default() };
+            way.look(solved, surface, direction, spread);
+        }
+        if way.count == CROWDED { None } else { Some(way.facets.head(way.count as usize)) }
+    }
+}
+
+/// Facets that come this near to the region in which rays run are taken to be in it: far above the rounding of points,
+/// directions and hits.
+const MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
+
+impl Way {
+    /// Finds what reaches into the region that the facet sweeps along the directions, from where rays start above it.
+    #[inline(never)]
+    fn look(&mut self, solved: &Solved<'_>, surface: &Surface, direction: Vec3, spread: f64) {
+        self.count = CROWDED;
+        let corners = solved.scene.corners().at(surface.facet);
+        let normal = surface.normal;
+        let top = corners.iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
+        // rays start twice as high
+        let plane = Half { normal, height: top + 0.5 * OFFSET };
+        let mut halves = [plane; 4];
+        let [a, b, c] = corners;
+        for (half, (from, to, other)) in
+            halves.part_mut(1..4).iter_mut().zip([(a, b, c), (b, c, a), (c, a, b)])
+        {
+            let Some(inward) = inward(to - from, other - from, direction, spread) else { return };
+            *half = Half { normal: inward, height: inward.dot(from).min(inward.dot(to)) - MARGIN };
+        }
+        let (mut count, own) = (0, surface.facet as u32);
+        // of what is in the way to an image of the sun, the mirrors that may show it count
+        let image = self.toward >= Toward::Image(0).number();
+        let facets = &mut self.facets;
+        solved.bvh.within(&halves, |facet| {
+            if facet == own || image && !solved.shows_sun(facet as usize, direction) {
+                return true;
+            }
+            facets.set(count, facet);
+            count += 1;
+            count <= MOST
+        });
+        self.count = if count <= MOST { count as u32 } else { CROWDED };
+    }
+}
+
+impl Solved<'_> {
+    /// Whether a facet may show the sun, or an image of it, to who looks along `axis`.
+    fn shows_sun(&self, facet: usize, axis: Vec3) -> bool {
+        let material = self.scene.material(facet);
+        let Some(sun) = &self.light.sun else { return false };
+        if self.scene.mirror(material) == NO_MIRROR || self.scene.gloss(material).is_some() {
+            return false;
+        }
+        let side = usize::from(self.scene.side_normal(facet, 0).dot(axis) > 0.0);
+        if side >= self.scene.sides() {
+            return false;
+        }
+        let mirrored = reflect(axis, self.scene.side_normal(facet, side));
+        let place = facet * self.scene.sides() + side;
+        1.0 - mirrored.dot(sun.direction()) < SAME
+            || self.images.may_show(self.elements.facet_sides(), place, mirrored)
+    }
+}
+
+/// Whether any line from `point` within an angle of sine `spread` of the unit vector `axis` may meet a facet.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+pub(super) fn may_meet(corners: &[Vec3; 3], point: Vec3, axis: Vec3, spread: f64) -> bool {
+    let [a, b, c] = *corners;
+    let farthest = [a, b, c].iter().map(|&corner| (corner - point).length_squared()).fold(0.0, f64::max);
+    // twice the spread: more than its tangent
+    let off = MARGIN + 2.0 * spread * sqrt(farthest);
+    [(a, b, c), (b, c, a), (c, a, b)].iter().all(|&(from, to, other)| {
+        let across = (to - from).cross(axis);
+        let across = if across.dot(other - from) < 0.0 { -across } else { across };
+        across.dot(point - from) >= -off * sqrt(across.dot(across))
+    })
+}
+
+/// The normal of the plane along an edge and the direction, turned outward so far that all within the spread are on the
+/// side of the other corner; `None` where they are all around.
+fn inward(edge: Vec3, other: Vec3, direction: Vec3, spread: f64) -> Option<Vec3> {
+    let across = edge.cross(direction);
+    let length = sqrt(across.dot(across));
+    let edge_length = sqrt(edge.dot(edge));
+    // the sine of the angle between edge and direction, of which the spread is to be a part
+    let sine = length / edge_length;
+    if !(sine > 4.0 * spread && sine > 1e-6) {
+        return None;
+    }
+    let across = across * (if across.dot(other) < 0.0 { -1.0 } else { 1.0 } / length);
+    if spread == 0.0 {
+        return Some(across);
+    }
+    // the direction's part at right angles to the edge
+    let ahead = direction - edge * (edge.dot(direction) / (edge_length * edge_length));
+    let ahead = ahead / sqrt(ahead.dot(ahead));
+    let turn = spread / sine;
+    Some(across * sqrt(1.0 - turn * turn) + ahead * turn)
+}

@@ -1,0 +1,260 @@
+//! Sunlight on a point that a chain meets: straight, mirrored by flat facets, and in lobes.
+
+use super::outlook::{Toward, may_meet};
+use super::{How, Leg, Path, Sample, Solved, Terms};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{FRAC_1_PI, Vec3, pow, reflect, sqrt};
+use crate::base::qmc::{Sequence, hash2};
+use crate::coupling::word::LONGEST;
+use crate::radiosity::sun_image::{CUTOFF, SAME};
+use crate::rays::surface::{Mirror, Surface};
+use crate::scene::MAX_BANDS;
+use crate::scene::sun::Sun;
+
+/// Most rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them
+/// agree, these are enough.
+const DISC_RAYS: (u32, u32) = (16, 4);
+
+/// So many of them that what is at stake is wrong by a part of the tolerance: half of it by n^-3/4, at the middle of a
+/// penumbra, is to be this part.
+const DISC_ERROR: f64 = 0.25;
+
+/// Penumbrae that these rays leave less wrong, in tolerances, need no others.
+const SAMPLED: f64 = 0.1;
+
+/// The most rays toward the sun's disc.
+const MOST_DISC_RAYS: u32 = 1024;
+
+impl Solved<'_> {
+    /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    pub(super) fn sun_cosine(
+        &self,
+        leg: &Leg<'_>,
+        surface: &Surface,
+        how: &mut How<'_, '_>,
+        path: &mut Path,
+    ) -> f64 {
+        let Some(sun) = &self.light.sun else { return 0.0 };
+        let cosine = sun.cosine(surface.normal);
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        let known = how.outlook.before(self, surface, Toward::Sun, (sun.direction(), sun.half_angle()));
+        if known.is_some_and(<[u32]>::is_empty) && surface.normal.dot(sun.direction()) > sun.half_angle() {
+            // all of the disc is above the facet
+            return cosine;
+        }
+        let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
+        let mut lit = 0.0;
+        let all = self.over_disc(sun, at_stake, surface, how.sample, path, |path, toward, share| {
+            let ray = surface.leave(toward);
+            let seen = match known {
+                Some([]) => true,
+                Some(known) => self.bvh.closest_among(&ray, known).is_none(),
+                None => !self.bvh.occluded(&ray),
+            };
+            path.rays += u32::from(known.is_none_or(|k| !k.is_empty()));
+            lit += if seen { share } else { 0.0 };
+            seen
+        });
+        if all > 0.0 { cosine * (lit / all) } else { 0.0 }
+    }
+
+    /// Calls `ray` with directions toward the sun and their shares until it is known well enough, for what is at stake,
+    /// which part of the disc brings light (`ray` says true); returns the sum of all shares.
+    #[inline]
+    fn over_disc(
+        &self,
+        sun: &Sun<'_>,
+        at_stake: f64,
+        surface: &Surface,
+        sample: Sample,
+        path: &mut Path,
+        mut ray: impl FnMut(&mut Path, Vec3, f64) -> bool,
+    ) -> f64 {
+        if sun.is_point() {
+            ray(path, sun.direction(), 1.0);
+            return 1.0;
+        }
+        // other coordinates than those of the place in the pixel: the same ones of another sequence are correlated with
+        // them bit by bit
+        let (sequence, coordinate, mut count, mut goal) = match sample {
+            Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
+            Sample::Alone(seed) => {
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.0))
+            }
+            Sample::Glance(seed) => {
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.1))
+            }
+        };
+        let (mut lit, mut all) = (0.0, 0.0);
+        while count < goal {
+            let (u, v) = sequence.pair(count, coordinate);
+            let toward = sun.sample(u, v);
+            let share = sun.share(toward, surface.normal);
+            count += 1;
+            if share > 0.0 {
+                all += share;
+                lit += if ray(path, toward, share) { share } else { 0.0 };
+            }
+            if count == goal && lit != 0.0 && lit != all {
+                let part = lit / all;
+                let error = at_stake * sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
+                if matches!(sample, Sample::Alone(_))
+                    && count < MOST_DISC_RAYS
+                    && error > self.settings.tolerance
+                {
+                    goal *= 2;
+                } else if error > SAMPLED * self.settings.tolerance {
+                    path.sampled = true;
+                } else {
+                    path.noise += error;
+                }
+            }
+        }
+        all
+    }
+
+    /// Rays toward the sun's disc to begin with.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
+        let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.tolerance);
+        (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
+    }
+
+    /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn sun_at_stake(&self, leg: &Leg<'_>, surface: &Surface, sun: &Sun<'_>) -> f64 {
+        let diffuse = self.scene.diffuse(surface.material);
+        let mut largest: f64 = 0.0;
+        for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
+            let value = FRAC_1_PI * rho * leg.through.at(band) * sun.irradiance(band);
+            largest = if value > 0.0 { largest.max(value / reference) } else { largest };
+        }
+        largest
+    }
+
+    /// Adds to `to` what flat mirrors throw of the sun on a point: rays toward each of its images.
+    #[inline(never)]
+    pub(super) fn add_images(
+        &self,
+        leg: &mut Leg<'_>,
+        surface: &Surface,
+        how: &mut How<'_, '_>,
+        to: &mut [f64; MAX_BANDS],
+        path: &mut Path,
+    ) {
+        let Some(sun) = &self.light.sun else { return };
+        let (sides, bands) = (self.scene.sides(), self.shape.bands);
+        let side = surface.facet * sides + surface.side;
+        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors + 1));
+        for (n, axis) in (0..).zip(self.images.of(self.elements.facet_sides(), side)) {
+            let image = sun.seen_toward(axis);
+            let cosine = image.cosine(surface.normal);
+            if cosine <= 0.0 {
+                continue;
+            }
+            let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
+            if known.is_some_and(|mirrors| !self.any_may_show(mirrors, surface.point, axis, sun)) {
+                continue;
+            }
+            let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
+            let [lit, products] = &mut *leg.images;
+            lit.head_mut(bands).fill(0.0);
+            let all = self.over_disc(&image, at_stake, surface, how.sample, path, |path, toward, share| {
+                let seen = self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
+                if seen {
+                    lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
+                }
+                seen
+            });
+            if all > 0.0 {
+                self.add_lit(leg, surface, (sun, cosine, all), to);
+            }
+        }
+    }
+
+    /// Whether any of these mirrors may show a point the sun whose middle seems to stand in the direction `axis`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn any_may_show(&self, mirrors: &[u32], point: Vec3, axis: Vec3, sun: &Sun<'_>) -> bool {
+        mirrors
+            .iter()
+            .any(|&facet| may_meet(&self.scene.corners().at(facet as usize), point, axis, sun.half_angle()))
+    }
+
+    /// Adds what an image of the sun brings, of whose disc `leg.images` holds the lit share of `all`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn add_lit(
+        &self,
+        leg: &Leg<'_>,
+        surface: &Surface,
+        (sun, cosine, all): (&Sun<'_>, f64, f64),
+        to: &mut [f64; MAX_BANDS],
+    ) {
+        let diffuse = self.scene.diffuse(surface.material);
+        for (band, (to, (lit, rho))) in to.iter_mut().zip(leg.images[0].iter().zip(diffuse)).enumerate() {
+            let irradiance = sun.irradiance(band) * cosine * (lit / all);
+            *to += leg.through.at(band) * rho * FRAC_1_PI * irradiance;
+        }
+    }
+
+    /// Whether mirrors show a point that looks `toward` it the sun whose middle seems to stand in the direction `axis`,
+    /// and the product of the reflectances of those that it meets, at most `most`.
+    fn mirrored_sun(
+        &self,
+        sun: &Sun<'_>,
+        from: &Surface,
+        (toward, mut axis): (Vec3, Vec3),
+        most: u32,
+        products: &mut [f64; MAX_BANDS],
+        path: &mut Path,
+    ) -> bool {
+        let mut ray = from.leave(toward);
+        let mut mirrors = 0;
+        products.head_mut(self.shape.bands).fill(1.0);
+        loop {
+            path.rays += 1;
+            let Some(hit) = self.bvh.closest(&ray) else {
+                return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SAME;
+            };
+            let Some(surface) = Surface::of_hit(self.scene, &hit) else { return false };
+            if mirrors >= most || !surface.is_ideal(self.scene) {
+                return false;
+            }
+            let mut largest = 0.0;
+            for (product, rho) in products.iter_mut().zip(self.scene.specular(surface.material)) {
+                *product *= rho;
+                largest = f64::max(largest, *product);
+            }
+            // as far as beams are traced
+            if largest < CUTOFF * self.settings.tolerance || mirrors as usize >= LONGEST {
+                return false;
+            }
+            mirrors += 1;
+            axis = reflect(axis, surface.normal);
+            let (sides, side) =
+                (self.elements.facet_sides(), surface.facet * self.scene.sides() + surface.side);
+            if 1.0 - axis.dot(sun.direction()) >= SAME && !self.images.may_show(sides, side, axis) {
+                // what this mirror shows is no image of the sun
+                return false;
+            }
+            ray = surface.leave(reflect(ray.direction, surface.normal));
+        }
+    }
+
+    /// The sun in a lobe, evaluated directly: E q(sun, view) V.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    pub(super) fn add_sun_gloss(&self, leg: &Leg<'_>, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
+        let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
+        let toward: Vec3 = sun.direction();
+        if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
+            return;
+        }
+        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
+        let value = lobe.value(mirrored.dot(toward));
+        let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(self.shape.bands);
+        own.enumerate().for_each(|(band, (to, through))| *to += through * sun.irradiance(band) * value);
+    }
+}

@@ -1,0 +1,767 @@
+//! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
+
+mod lines;
+mod thin;
+
+use crate::base::arena::{Arena, Need, plain_table};
+use crate::base::error::{Error, Field};
+use crate::base::index::{Index, IndexMut, copy, pieces};
+use crate::base::math::{clamp, fabs, floor, narrow, pow, sqrt};
+use crate::base::qmc::{Sequence, hash2};
+use crate::rays::bvh::Ahead;
+use crate::rays::ray::{Hit, Line, Ray};
+use crate::scene::MAX_BANDS;
+use crate::view::camera::{Camera, Sampling};
+use crate::view::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
+use crate::view::raster::{Items, NOTHING, UNSURE};
+use core::ops::Range;
+use lines::{Fineness, Measure, integrate};
+
+/// What was done on a range of rows; ranges add up with [`Tally::add`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Pixels whose centre ray meets the object.
+    pub object_pixels: u64,
+    /// Rays through pixels.
+    pub primary: u64,
+    /// Rays of chains and toward the sun.
+    pub chain: u64,
+    /// Pixels sampled more than once.
+    pub refined: u64,
+    /// Sum over object pixels of the squared expected error from the diffuse solution.
+    pub noise2: f64,
+    /// The same of the error from sampling the pixel's area.
+    pub sampling2: f64,
+    /// Largest bound on what cut chains could still have brought.
+    pub tail: f64,
+}
+
+impl Tally {
+    /// Adds the tally of the next range.
+    pub fn add(&mut self, next: &Tally) {
+        // a caller may hand over any numbers
+        let add = |to: &mut u64, more: u64| *to = to.saturating_add(more);
+        add(&mut self.object_pixels, next.object_pixels);
+        add(&mut self.primary, next.primary);
+        add(&mut self.chain, next.chain);
+        add(&mut self.refined, next.refined);
+        self.noise2 += next.noise2;
+        self.sampling2 += next.sampling2;
+        self.tail = self.tail.max(next.tail);
+    }
+
+    /// Root mean square over the object's pixels of both errors, relative to the reference radiance.
+    pub fn estimate(&self) -> f64 {
+        if self.object_pixels == 0 {
+            return 0.0;
+        }
+        sqrt(((self.noise2 + self.sampling2) / self.object_pixels as f64).max(0.0))
+    }
+}
+
+/// Where a range of rows is written: (row, column, band), row by row.
+#[derive(Debug)]
+pub struct Target<'o> {
+    /// Radiance.
+    pub image: &'o mut [f32],
+    /// The terms of eq. (11): diffuse, mirror-sky, mirror-diffuse; same shape, or empty.
+    pub components: [&'o mut [f32]; 3],
+}
+
+/// Bytes of scratch memory for [`rows`]: three rows of pixel centres, what integrals over a pixel hold, and the facets
+/// that some rows of centres meet.
+pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
+    let width = camera.columns() + 2;
+    let need = Need::new().and::<f64>(3 * width * (3 * bands + NOTES)).and::<f64>(work(bands));
+    let need = need.and::<Board>(1).and::<Way>(Outlook::ROOM);
+    Items::need(need, width, DRAWN).bytes()
+}
+
+/// Rows of one piece of an image of so many, for who shares them out: few enough to balance, enough to be drawn together;
+/// the same for any number of threads, so that sums over pixels are the same too.
+pub fn piece(rows: usize) -> usize {
+    rows.div_ceil(128).max(DRAWN)
+}
+
+/// Rows that are drawn together.
+const DRAWN: usize = 8;
+
+/// Meshes of more facets than so many times the pixels are not drawn: rays cost less.
+const FACETS: usize = 2;
+
+/// Values of two nested integrals and the result.
+fn work(bands: usize) -> usize {
+    2 * lines::memory(3 * bands) + 3 * bands
+}
+
+/// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
+const NOTES: usize = 5;
+
+/// Fewest and most rays through a pixel that is sampled by scattered rays.
+const FEWEST: u32 = 8;
+const MOST: u32 = 1024;
+
+/// Error of the mean of n scattered rays of the standard deviation s over s n^-3/4: 0.8 to 1.2 in penumbrae, lobes and
+/// at edges for 4 to 256 rays.
+const SCATTERED: f64 = 1.2;
+
+/// Error of integrals along lines over that of the jumps that they have left: what lies between lines is not among it.
+const LINES: f64 = 1.5;
+
+/// Share of the contrast with neighbours that rays which have not seen it may miss.
+const UNSEEN: f64 = 0.35;
+
+/// A pixel whose centre differs from the mean of two opposite neighbours by at most so many tolerances keeps the
+/// centre's value: an edge of that contrast brings an error of a fifth of it, and a change that is linear none.
+const FLAT: f64 = 2.0;
+
+/// The same of a pixel's difference from its neighbours, that much of which counts as a bend: what changes has details
+/// that no centre shows more often than what does not.
+const STEEP: f64 = 0.25;
+
+/// The part of the tolerance that sampling the pixels' area may take, as root mean square over the object's pixels.
+const PART: f64 = 0.5;
+
+/// Largest error of one pixel, in tolerances.
+const LARGEST: f64 = 2.0;
+
+/// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line: what
+/// reaches less far into a pixel than a part, and ends there, is missed. The finer ones are for tolerances below [`FINE`].
+const PARTS: (usize, usize) = (4, 8);
+const FINE: f64 = 1e-3;
+
+/// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
+/// are up to so many times the error wanted.
+const COARSE: f64 = 60.0;
+
+/// Narrowest parts between lines, and along them.
+const NARROWEST: (f64, f64) = (1.0 / 64.0, 1.0 / 4096.0);
+
+/// Lines of a pixel that has cost so many rays are not halved.
+const ENOUGH: u64 = 2048;
+
+/// Places along lines shift by this from line to line: its multiples by the powers of two up to 16, between which
+/// lines are halved, fill the unit interval evenly (16 times it is the golden ratio).
+const SHIFT: f64 = 64.0 * 0.101_127_124_296_868_43;
+
+/// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
+///
+/// Centre sampling: the radiance along the centre's ray, exactly. Area sampling: a pixel whose centre and eight
+/// neighbours vary linearly, to two tolerances, keeps its centre's value. Others are integrated along lines, by
+/// rays that halve the places of jumps, until the row's root mean square error is half the tolerance; where lobes or
+/// penumbrae are in a pixel, whose radiance is a mean of rays itself, or few rays do, by scattered rays instead.
+///
+/// # Errors
+/// [`Error::Range`] for rows outside the image, [`Error::Length`] for outputs of another size.
+pub fn rows(
+    solved: &Solved<'_>,
+    camera: &Camera,
+    range: Range<usize>,
+    target: &mut Target<'_>,
+    scratch: &mut [u8],
+) -> Result<Tally, Error> {
+    if range.start > range.end || range.end > camera.rows() {
+        return Err(Error::Range { field: Field::Rows, band: 0, value: range.end as f64 });
+    }
+    let bands = solved.shape.bands;
+    let expected = range.len() * camera.columns() * bands;
+    if target.image.len() != expected {
+        return Err(Error::Length { what: "image", expected, given: target.image.len() });
+    }
+    for component in &target.components {
+        if !component.is_empty() && component.len() != expected {
+            return Err(Error::Length { what: "image component", expected, given: component.len() });
+        }
+    }
+    let settings = solved.settings.of_image(camera, solved.scene);
+    let solved = &Solved { settings, ..*solved };
+    let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
+    let width = camera.columns() + 2;
+    let stride = 3 * bands + NOTES;
+    let area = camera.sampling() == Sampling::Area;
+    let lines = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
+    let work = arena.take::<f64>(work(bands))?;
+    let board = arena.take::<Board>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+    board.work.gathered.start();
+    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let items = Items::new(&mut arena, width, DRAWN)?;
+    let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
+    let mut painter = Painter {
+        solved,
+        camera,
+        lines,
+        work,
+        width,
+        stride,
+        board,
+        beside: false,
+        primary: Primary {
+            items,
+            draws,
+            drawn: 0..0,
+            last: range.end as isize + isize::from(area),
+            line: None,
+        },
+        outlook: Outlook::none(),
+        tally: Tally::default(),
+    };
+    if solved.bvh.is_own() {
+        painter.outlook = Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
+    }
+    if camera.is_parallel() {
+        painter.look_beside();
+    }
+    match camera.sampling() {
+        Sampling::Centre => painter.centres(range, target),
+        Sampling::Area => painter.areas(range, target),
+    }
+    Ok(painter.tally)
+}
+
+/// Rays toward the sun of a pixel, some more or less.
+const SUN_RAYS: f64 = 8.0;
+
+/// How far from a pixel's edges its rays stay, in pixels.
+const EDGE: f64 = 1e-6;
+
+plain_table! {
+    /// A ray's terms and what following it takes, and the sums over scattered rays.
+    pub struct Board {
+        /// Of the latest ray.
+        pub terms: Terms,
+        /// While it is followed.
+        pub work: Work,
+        /// Sums over rays.
+        pub sums: Terms,
+        /// Sums of squares.
+        pub squares: [f64; MAX_BANDS],
+        /// What parallel rays see beside the object.
+        pub background: Terms,
+    }
+}
+
+/// What rays through pixel centres meet.
+struct Primary<'m> {
+    items: Items<'m>,
+    /// Whether facets are drawn, rather than rays traced.
+    draws: bool,
+    /// Rows in the item buffer.
+    drawn: Range<isize>,
+    /// Rows from here on are not needed.
+    last: isize,
+    /// Of parallel rays.
+    line: Option<Line>,
+}
+
+impl Primary<'_> {
+    /// Makes the item buffer hold a row.
+    fn draw(&mut self, solved: &Solved<'_>, camera: &Camera, row: isize) {
+        if self.draws && !self.drawn.contains(&row) {
+            self.drawn = row..self.last.min(row + DRAWN as isize).max(row + 1);
+            self.items.draw(solved.bvh, &camera.samples(), self.drawn.clone(), -1);
+        }
+    }
+
+    /// The facet that a pixel's centre shows, as [`Items::facet`] tells.
+    #[inline]
+    fn facet(&self, row: isize, column: isize) -> u32 {
+        if self.draws { self.items.facet(row, column) } else { UNSURE }
+    }
+}
+
+struct Painter<'a, 's> {
+    solved: &'a Solved<'a>,
+    camera: &'a Camera,
+    /// Three rows of pixel centres, with a column more on either side: three terms, then [`NOTES`].
+    lines: &'s mut [f64],
+    work: &'s mut [f64],
+    width: usize,
+    stride: usize,
+    board: &'s mut Board,
+    /// Whether the latest pixel's centre shows the background, rather than the board's terms.
+    beside: bool,
+    primary: Primary<'s>,
+    outlook: Outlook<'s>,
+    tally: Tally,
+}
+
+impl<'a> Painter<'a, '_> {
+    /// What parallel rays have in common: their line, and what they see beside the object.
+    #[inline(never)]
+    fn look_beside(&mut self) {
+        let ray = self.camera.ray(0.0, 0.0);
+        self.primary.line = Line::new(&ray);
+        let Board { terms, work, background, .. } = &mut *self.board;
+        work.gathered.forget();
+        self.solved.radiance_with((&ray, None), Sample::Alone(0), terms, work, &mut self.outlook);
+        *background = *terms;
+    }
+
+    #[inline(never)]
+    fn centres(&mut self, range: Range<usize>, target: &mut Target<'_>) {
+        let columns = self.camera.columns();
+        for (i, row) in range.enumerate() {
+            self.line(row as isize, 0..columns as isize, |this, pixels, path| {
+                this.note(path.object, path.variance + path.noise * path.noise, path.tail);
+                let terms = this.terms();
+                let first = i * columns + pixels.start as usize;
+                put(target, this.solved.shape.bands, first..first + pixels.len(), 1.0, |term, band| {
+                    [&terms.diffuse, &terms.mirror_sky, &terms.mirror_diffuse].map(|t| t.at(band)).at(term)
+                });
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn areas(&mut self, range: Range<usize>, target: &mut Target<'_>) {
+        let columns = self.camera.columns() as isize;
+        let (first, last) = (range.start as isize, range.end as isize);
+        if first < last {
+            self.line(first - 1, -1..columns + 1, |this, own, path| this.keep(first - 1, own, path));
+            self.line(first, -1..columns + 1, |this, own, path| this.keep(first, own, path));
+        }
+        for row in first..last {
+            self.line(row + 1, -1..columns + 1, |this, own, path| this.keep(row + 1, own, path));
+            let goal = self.goal(row, columns);
+            self.find_thin(row, columns);
+            let index = |j: isize| (row - first) as usize * columns as usize + j as usize;
+            let mut beside = false;
+            for j in 0..columns {
+                let at = self.slot(row, j);
+                let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(at + self.stride - NOTES + i));
+                self.note(object > 0.0, variance, tail);
+                if self.is_flat(at) && !beside {
+                    self.write(target, index(j), at);
+                    continue;
+                }
+                beside = self.settle(target, index(j), (row, j), goal);
+                let (mut more, mut back) = (beside, j - 1);
+                while more && back >= 0 && self.is_flat(self.slot(row, back)) {
+                    more = self.settle(target, index(back), (row, back), goal);
+                    back -= 1;
+                }
+            }
+            for j in 0..columns {
+                let at = self.slot(row, j);
+                if self.is_flat(at) {
+                    self.err(at, 0.2 * self.lines.at(at + self.stride - 1));
+                }
+            }
+        }
+    }
+
+    /// Samples a pixel; whether it shows what its centre does not, so that those to its left and right may, too: a strip
+    /// passes between the centres of many pixels.
+    fn settle(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        goal: f64,
+    ) -> bool {
+        let at = self.slot(row, column);
+        let error = self.refine(target, index, row, column, goal);
+        self.err(at, error);
+        // flat no more
+        self.lines.set(at + self.stride - 1, f64::INFINITY);
+        let bands = self.solved.shape.bands;
+        let values = target.image.part(index * bands..(index + 1) * bands);
+        self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
+            let centre = [0, 1, 2].map(|term| self.lines.at(at + term * bands + band)).iter().sum::<f64>();
+            fabs(f64::from(*value) - f64::from(narrow(centre)))
+                > FLAT * self.solved.settings.tolerance * reference
+        })
+    }
+
+    /// Finds the unevenness about all pixels of a row, and the error that each of its uneven ones may have for the
+    /// row's root mean square to be a small part of the tolerance.
+    #[inline(never)]
+    fn goal(&mut self, row: isize, columns: isize) -> f64 {
+        let tolerance = self.solved.settings.tolerance;
+        let (mut object, mut uneven) = (0.0, 0.0);
+        for j in 0..columns {
+            let value = self.unevenness(row, j);
+            let end = self.slot(row, j) + self.stride;
+            self.lines.set(end - 1, value);
+            if self.lines.at(end - NOTES) > 0.0 {
+                object += 1.0;
+                uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
+            }
+        }
+        if uneven > 0.0 {
+            tolerance * (PART * sqrt(object / uneven)).min(LARGEST)
+        } else {
+            LARGEST * tolerance
+        }
+    }
+
+    /// Whether a pixel keeps its centre's value.
+    fn is_flat(&self, at: usize) -> bool {
+        let end = at + self.stride;
+        let (sampled, uneven) = (self.lines.at(end - 2), self.lines.at(end - 1));
+        sampled == 0.0 && uneven <= FLAT * self.solved.settings.tolerance
+    }
+
+    /// Counts the error of an object pixel's area sampling.
+    fn err(&mut self, at: usize, error: f64) {
+        if self.lines.at(at + self.stride - NOTES) > 0.0 {
+            self.tally.sampling2 += error * error;
+        }
+    }
+
+    /// Where a pixel's centre stands in the lines.
+    #[inline]
+    fn slot(&self, row: isize, column: isize) -> usize {
+        slot(row, column, self.width, self.stride)
+    }
+
+    /// Computes the centres of a row: `each` finds the terms of each range of pixels on the board, of pixel after pixel or
+    /// many of the background.
+    #[inline(never)]
+    fn line(
+        &mut self,
+        row: isize,
+        columns: Range<isize>,
+        mut each: impl FnMut(&mut Self, Range<isize>, &Path),
+    ) {
+        self.primary.draw(self.solved, self.camera, row);
+        self.tally.primary += columns.len() as u64;
+        let mut ahead = Ahead::default();
+        let skips = self.primary.draws && self.camera.is_parallel();
+        let mut j = columns.start;
+        while j < columns.end {
+            if skips {
+                let next = self.primary.items.next(row, j, columns.end);
+                if next > j {
+                    self.beside = true;
+                    each(self, j..next, &Path::default());
+                    j = next;
+                    continue;
+                }
+            }
+            let facet = self.primary.facet(row, j);
+            let ray = self.centre(row, j);
+            let hit = self.first_hit(&mut ahead, &ray, facet, (row, j), &columns);
+            self.beside = false;
+            let path = self.follow(&ray, hit, row, j);
+            each(self, j..j + 1, &path);
+            j += 1;
+        }
+    }
+
+    /// The terms of the latest pixel's centre.
+    #[inline]
+    fn terms(&self) -> &Terms {
+        if self.beside { &self.board.background } else { &self.board.terms }
+    }
+
+    /// The ray through a pixel's centre.
+    #[inline]
+    fn centre(&self, row: isize, column: isize) -> Ray {
+        self.camera.ray(column as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// What the ray through a pixel's centre meets, `facet` for all that is known.
+    #[inline]
+    fn first_hit(
+        &self,
+        ahead: &mut Ahead,
+        ray: &Ray,
+        facet: u32,
+        (row, column): (isize, isize),
+        columns: &Range<isize>,
+    ) -> Option<Hit> {
+        if facet == NOTHING {
+            return None;
+        }
+        if facet != UNSURE
+            && let Some(line) = self.primary.line.or_else(|| Line::new(ray))
+            && let Some(hit) = self.solved.bvh.meet(&line, ray, facet)
+        {
+            return Some(hit);
+        }
+        let number = |j: isize| (j - columns.start) as u32;
+        let any =
+            |n: u32| if n == number(column) { *ray } else { self.centre(row, columns.start + n as isize) };
+        self.solved.bvh.closest_of(ahead, number(column), number(columns.end), any)
+    }
+
+    /// Puts the terms of a pixel's centre on the board.
+    #[inline]
+    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, row: isize, column: isize) -> Path {
+        let seed = hash2(row as u32, column as u32);
+        let sample = match self.camera.sampling() {
+            Sampling::Centre => Sample::Alone(seed),
+            Sampling::Area => Sample::Glance(seed),
+        };
+        let Board { terms, work, .. } = &mut *self.board;
+        work.gathered.forget();
+        terms.clear(self.solved.shape.bands);
+        let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.outlook);
+        self.tally.chain += u64::from(path.rays);
+        path
+    }
+
+    /// Keeps what is on the board as the centres of pixels in the lines.
+    fn keep(&mut self, row: isize, pixels: Range<isize>, path: &Path) {
+        let bands = self.solved.shape.bands;
+        let Board { terms, background, .. } = &*self.board;
+        let terms = if self.beside { background } else { terms };
+        let variance = path.variance + path.noise * path.noise;
+        let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
+        for column in pixels {
+            let at = slot(row, column, self.width, self.stride);
+            let slot = self.lines.part_mut(at..at + self.stride);
+            copy(slot.part_mut(0..bands), &terms.diffuse);
+            copy(slot.part_mut(bands..2 * bands), &terms.mirror_sky);
+            copy(slot.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
+            copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, variance, path.tail, sampled, 0.0]);
+        }
+    }
+
+    /// Counts an object pixel and its expected errors.
+    fn note(&mut self, object: bool, variance: f64, tail: f64) {
+        if object {
+            self.tally.object_pixels += 1;
+            self.tally.noise2 += variance;
+            self.tally.tail = self.tally.tail.max(tail);
+        }
+    }
+
+    /// Writes a pixel's centre.
+    fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
+        let bands = self.solved.shape.bands;
+        let slot = self.lines.part(at..at + 3 * bands);
+        put(target, bands, index..index + 1, 1.0, |term, band| slot.at(term * bands + band));
+    }
+
+    /// Largest difference between a pixel's centre and the mean of two opposite neighbours, relative to the reference
+    /// radiance.
+    fn unevenness(&self, row: isize, column: isize) -> f64 {
+        let measure = self.measure();
+        let centre = |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+        let mut largest: f64 = 0.0;
+        for (i, j) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
+            let [before, here, after] = [centre(-i, -j), centre(0, 0), centre(i, j)];
+            let contrast = measure.step(before, here).max(measure.step(here, after));
+            largest = largest.max(measure.bend(before, here, after)).max(STEEP * contrast);
+        }
+        largest
+    }
+
+    /// How values are compared.
+    fn measure(&self) -> Measure<'a> {
+        Measure { bands: self.solved.shape.bands, reference: self.solved.reference }
+    }
+
+    /// Has the elements of a pixel that rays mend mended about its middle, rather than where lines or scattered rays first
+    /// meet them.
+    #[inline(never)]
+    fn look_about(&mut self, row: isize, column: isize) {
+        self.board.work.gathered.forget();
+        for (x, y) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25)] {
+            let ray = self.camera.ray(column as f64 + x, row as f64 + y);
+            let hit = self.solved.bvh.closest(&ray);
+            let sample = Sample::Glance(hash2(row as u32, column as u32));
+            let Board { terms, work, .. } = &mut *self.board;
+            terms.clear(self.solved.shape.bands);
+            let path = self.solved.radiance_with((&ray, hit), sample, terms, work, &mut self.outlook);
+            self.tally.primary += 1;
+            self.tally.chain += u64::from(path.rays);
+            if work.gathered.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// The mean over a pixel's square to about the error `goal`; returns the error expected.
+    fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
+        self.tally.refined += 1;
+        if self.solved.gathers() {
+            self.look_about(row, column);
+        }
+        let mut sampled = false;
+        let measure = self.measure();
+        let (mut along, mut down) = (0.0, 0.0);
+        for i in -1..=1 {
+            let centre =
+                |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+            for j in -1..=1 {
+                sampled |= centre(i, j).at(self.stride - 2) > 0.0;
+            }
+            along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
+            down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
+        }
+        let contrast = along.max(down);
+        let steep = contrast > COARSE * goal;
+        // scattered rays are few, and may all miss what is thin
+        let thin = !steep && self.is_thin(row, column);
+        if !sampled
+            && (steep || thin)
+            && let Some(error) = self.lines_across(target, index, (row, column), along >= down, goal)
+        {
+            return error;
+        }
+        let contrast = if thin { 1.0 } else { contrast };
+        self.scatter(target, index, (row, column), contrast, goal)
+    }
+
+    /// The mean over a pixel's square along lines in the direction in which its neighbourhood changes most; `None` where
+    /// lobes or penumbrae are in it.
+    fn lines_across(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        along: bool,
+        goal: f64,
+    ) -> Option<f64> {
+        let (solved, camera, measure) = (self.solved, self.camera, self.measure());
+        let stride = measure.stride();
+        let Painter { work, board, outlook, tally, .. } = self;
+        let (terms, chain) = (&mut board.terms, &mut board.work);
+        let (outer, rest) = work.split_at_mut_checked(lines::memory(stride))?;
+        let (inner, out) = rest.split_at_mut_checked(lines::memory(stride))?;
+        let seed = hash2(row as u32, column as u32);
+        let (turn, _) = Sequence::new(seed).pair(0, 0);
+        let before = tally.primary;
+        let goal = 0.7 * goal;
+        let parts = if solved.settings.tolerance < FINE { PARTS.1 } else { PARTS.0 };
+        let mut line = |y: f64, out: &mut [f64]| {
+            let shift = turn + SHIFT * y;
+            let shift = (shift - floor(shift) - 0.5) / parts as f64;
+            let mut places = [0.0; PARTS.1 + 1];
+            let places = evenly(&mut places, parts, shift);
+            let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
+            integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
+                // a ray on the very edge may see what lies beyond it
+                let [x, y] = [x, y].map(|x| clamp(x, EDGE, 1.0 - EDGE));
+                let (x, y) = if along { (x, y) } else { (y, x) };
+                let ray = camera.ray(column as f64 + x, row as f64 + y);
+                terms.clear(measure.bands);
+                let hit = solved.bvh.closest(&ray);
+                let path = solved.radiance_with((&ray, hit), Sample::Glance(seed), terms, chain, outlook);
+                tally.primary += 1;
+                tally.chain += u64::from(path.rays);
+                let (diffuse, rest) = slot.split_at_mut_checked(measure.bands)?;
+                let (sky, mirrored) = rest.split_at_mut_checked(measure.bands)?;
+                copy(diffuse, &terms.diffuse);
+                copy(sky, &terms.mirror_sky);
+                copy(mirrored, &terms.mirror_diffuse);
+                (!path.sampled).then_some(0.0)
+            })
+        };
+        let mut places = [0.0; PARTS.1 + 1];
+        let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: NARROWEST.0 };
+        let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
+        let out = self.work.part(2 * lines::memory(stride)..self.work.len());
+        put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
+        Some(LINES * sqrt(error2))
+    }
+
+    /// The mean over a pixel's square of scattered rays, as many as their contrast asks for.
+    #[inline(never)]
+    fn scatter(
+        &mut self,
+        target: &mut Target<'_>,
+        index: usize,
+        (row, column): (isize, isize),
+        contrast: f64,
+        wanted: f64,
+    ) -> f64 {
+        let bands = self.solved.shape.bands;
+        let seed = hash2(row as u32, column as u32);
+        let sequence = Sequence::new(seed);
+        self.board.sums.clear(bands);
+        self.board.squares.head_mut(bands).fill(0.0);
+        let (mut n, mut goal) = (0u32, FEWEST);
+        let (mut error, mut ahead) = (0.0, Ahead::default());
+        while n < goal {
+            let camera = &self.camera;
+            let any = |n: u32| {
+                let (x, y) = sequence.pair(n, 0);
+                camera.ray(column as f64 + x, row as f64 + y)
+            };
+            let ray = any(n);
+            let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
+            self.board.terms.clear(bands);
+            let of = Sample::OneOf { seed, index: n };
+            let Board { terms, work, .. } = &mut *self.board;
+            let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.outlook);
+            self.tally.primary += 1;
+            self.tally.chain += u64::from(path.rays);
+            let Board { terms, sums, squares, .. } = &mut *self.board;
+            sums.add(terms, bands);
+            for (band, square) in squares.iter_mut().enumerate().take(bands) {
+                *square += terms.sum(band) * terms.sum(band);
+            }
+            n += 1;
+            if n == goal {
+                let share = 1.0 / f64::from(n);
+                let mut spread: f64 = 0.0;
+                for (band, (square, reference)) in squares.iter().zip(self.solved.reference).enumerate() {
+                    let mean = share * sums.sum(band);
+                    let variance = share * square - mean * mean;
+                    // below: rounding of equal rays
+                    if variance > 1e-12 * mean * mean {
+                        spread = spread.max(sqrt(variance) / reference);
+                    }
+                }
+                // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
+                error = SCATTERED * spread.max(UNSEEN * contrast * sqrt(share)) * pow(share, 0.75);
+                if error > wanted && goal < MOST {
+                    goal *= 2;
+                }
+            }
+        }
+        let sums = &self.board.sums;
+        let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
+        put(target, bands, index..index + 1, 1.0 / f64::from(n), |term, band| {
+            all.get(term).map_or(0.0, |values| values.at(band))
+        });
+        error
+    }
+}
+
+/// The ends of so many equal parts of the unit interval, those within it shifted.
+#[inline]
+fn evenly(places: &mut [f64; PARTS.1 + 1], parts: usize, shift: f64) -> &[f64] {
+    let places = places.head_mut(parts + 1);
+    places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / parts as f64 + shift);
+    places.set(0, 0.0);
+    places.set(parts, 1.0);
+    places
+}
+
+/// See [`Painter::slot`].
+#[inline]
+fn slot(row: isize, column: isize, width: usize, stride: usize) -> usize {
+    (row.rem_euclid(3) as usize * width + (column + 1) as usize) * stride
+}
+
+/// Writes the terms of pixels, `of` term and band, times `share`.
+#[inline]
+fn put(
+    target: &mut Target<'_>,
+    bands: usize,
+    pixels: Range<usize>,
+    share: f64,
+    of: impl Fn(usize, usize) -> f64,
+) {
+    let values = pixels.start * bands..pixels.end * bands;
+    let fill = |out: &mut [f32], band: usize, value: f32| {
+        let out = out.part_mut(values.clone());
+        if bands == 1 {
+            out.fill(value);
+        } else {
+            pieces(out, bands).for_each(|pixel| pixel.set(band, value));
+        }
+    };
+    for band in 0..bands {
+        let terms = [0, 1, 2].map(|term| of(term, band));
+        fill(target.image, band, narrow((terms[0] + terms[1] + terms[2]) * share));
+        for (component, term) in target.components.iter_mut().zip(terms).filter(|(o, _)| !o.is_empty()) {
+            fill(component, band, narrow(term * share));
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
+
+use crate::base::arena::{Arena, Need, plain_table};
+use crate::base::error::Error;
+use crate::base::index::Index;
+use crate::base::math::{Vec3, frame, unit};
+use crate::base::qmc::Sequence;
+use crate::rays::bvh::Ahead;
+use crate::rays::ray::{Hit, Ray};
+use crate::scene::MAX_BANDS;
+use crate::view::camera::Camera;
+use crate::view::chain::{Outlook, Sample, Solved, Terms, Way, Work};
+use crate::view::raster::{Lines, Samples, Span};
+use core::ops::Range;
+
+/// Rays that look at the object's whole projection along one direction, on a square grid of cells.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    samples: Samples,
+    cells: usize,
+    cell_area: f64,
+}
+
+/// The golden ratio less 1: rows of cells are shifted by its multiples, which fill a cell evenly.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+impl View {
+    /// The view along `forward` (toward the object), on `cells` x `cells` cells.
+    ///
+    /// Each cell has one ray. Those of a row stand a cell apart on a line that rises by one cell, and rows are shifted
+    /// against each other, so that an outline along either axis of the grid cuts cells everywhere between their edges.
+    pub fn new(solved: &Solved<'_>, forward: Vec3, cells: usize) -> Result<View, Error> {
+        let forward =
+            unit(forward).ok_or(Error::Direction { field: crate::base::error::Field::Direction })?;
+        let (right, up) = frame(forward);
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for corner in solved.scene.corners().iter().flatten() {
+            let p = Vec3::new(corner.dot(right), corner.dot(up), corner.dot(forward));
+            (low, high) = (low.min(p), high.max(p));
+        }
+        let size = high - low;
+        let cells = cells.max(1);
+        let step = 1.0 / cells as f64;
+        let samples = Samples {
+            eye: forward * (low.z - 1.0),
+            forward,
+            right,
+            up,
+            parallel: true,
+            first: (low.x, low.y),
+            step: (size.x * step, size.y * step),
+            shear: if size.x > 0.0 { size.y * step / size.x } else { 0.0 },
+            turn: GOLDEN,
+        };
+        Ok(View { samples, cells, cell_area: size.x * size.y * step * step })
+    }
+
+    /// The view of a camera's middle: along its viewing direction.
+    pub fn of_camera(solved: &Solved<'_>, camera: &Camera, cells: usize) -> Result<View, Error> {
+        View::new(solved, camera.forward(), cells)
+    }
+
+    /// Cells along each side: rows to be computed.
+    pub fn rows(&self) -> usize {
+        self.cells
+    }
+}
+
+plain_table! {
+    /// Sums over a row of cells, or over several.
+    pub struct Sums {
+        /// Projected area, in the caller's square units.
+        pub area: f64,
+        /// Radiant intensity in W/sr, one value per band.
+        pub intensity: [f64; MAX_BANDS],
+        /// Rays traced.
+        pub rays: u64,
+    }
+}
+
+impl Sums {
+    /// Nothing yet.
+    pub const ZERO: Sums = Sums { area: 0.0, intensity: [0.0; MAX_BANDS], rays: 0 };
+
+    /// Back to nothing.
+    fn clear(&mut self) {
+        self.area = 0.0;
+        self.intensity.fill(0.0);
+        self.rays = 0;
+    }
+
+    /// Adds the next row.
+    pub fn add(&mut self, next: &Sums) {
+        self.area += next.area;
+        self.intensity.iter_mut().zip(&next.intensity).for_each(|(a, b)| *a += b);
+        self.rays += next.rays;
+    }
+}
+
+/// Rows that are looked at together; small machines have little memory.
+const TOGETHER: usize = if cfg!(feature = "std") { 8 } else { 1 };
+
+/// Meshes of more facets than so many times the cells are sampled: rays cost less than all facets' ends.
+const FACETS: usize = 2;
+
+/// Facets less far apart on a row, in cells, touch.
+const GAP: f64 = 1e-9;
+
+/// Bytes of scratch memory for [`rows`] and [`whole`].
+pub fn scratch_bytes() -> Result<usize, Error> {
+    let need = Need::new().and::<Sums>(2).and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
+    Lines::need(need, TOGETHER).bytes()
+}
+
+/// The sums over each row of cells in `range`. Any split into ranges gives the same bits.
+///
+/// On the line through a row the facets that it shows and their ends are found exactly, so that the error of the outline
+/// is that of a sum over n lines; what they show is taken from rays up to a cell apart.
+///
+/// # Errors
+/// [`Error::Length`] for `out` of another length, [`Error::BufferTooSmall`] for less than [`scratch_bytes`].
+pub fn rows(
+    solved: &Solved<'_>,
+    view: &View,
+    range: Range<usize>,
+    scratch: &mut [u8],
+    out: &mut [Sums],
+) -> Result<(), Error> {
+    if out.len() != range.len() {
+        return Err(Error::Length { what: "signature rows", expected: range.len(), given: out.len() });
+    }
+    let mut out = out.iter_mut();
+    each_row(solved, view, range, scratch, |_, sums| {
+        if let Some(out) = out.next() {
+            *out = *sums;
+        }
+    })?;
+    Ok(())
+}
+
+/// The sums over all cells: those of all [`rows`], added in their order. They stand in the scratch memory.
+pub fn whole<'s>(solved: &Solved<'_>, view: &View, scratch: &'s mut [u8]) -> Result<&'s Sums, Error> {
+    each_row(solved, view, 0..view.rows(), scratch, |all, sums| all.add(sums))
+}
+
+/// Calls `each` with what it made of the rows before, at first nothing, and the sums over row after row.
+fn each_row<'s>(
+    solved: &Solved<'_>,
+    view: &View,
+    range: Range<usize>,
+    scratch: &'s mut [u8],
+    mut each: impl FnMut(&mut Sums, &Sums),
+) -> Result<&'s Sums, Error> {
+    let given = scratch.len();
+    let needed = scratch_bytes()?;
+    let mut arena = Arena::new(scratch, needed)?;
+    let short = Error::BufferTooSmall { needed, given };
+    let [all, sums] = arena.take::<Sums>(2)? else { return Err(short) };
+    let terms = arena.take::<Terms>(1)?.first_mut().ok_or(short)?;
+    let work = arena.take::<Work>(1)?.first_mut().ok_or(short)?;
+    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let mut lines = Lines::new(&mut arena, TOGETHER)?;
+    let own = solved.bvh.is_own();
+    let outlook = if own { Outlook::new(ways, true, view.cell_area, 1.0) } else { Outlook::none() };
+    let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
+    let solved = &Solved { settings: solved.settings.of_sums(), ..*solved };
+    let mut tracer = Tracer { solved, view, area, terms, work, outlook };
+    let flat = view.cell_area == 0.0;
+    let samples = !own || flat || solved.scene.facets() / FACETS > view.cells * view.cells;
+    let (mut next, end) = (range.start, range.end);
+    for row in range {
+        sums.clear();
+        if row == next && !samples {
+            next = end.min(row + TOGETHER);
+            lines.find(solved.bvh, &view.samples, view.cells, row as isize..next as isize);
+        }
+        match lines.of(row as isize) {
+            Some(spans) if !samples => tracer.spans(row, spans, sums),
+            _ => tracer.sample(row, sums),
+        }
+        each(all, sums);
+    }
+    Ok(all)
+}
+
+struct Tracer<'a> {
+    solved: &'a Solved<'a>,
+    view: &'a View,
+    /// Of a cell, in the caller's square units.
+    area: f64,
+    terms: &'a mut Terms,
+    work: &'a mut Work,
+    outlook: Outlook<'a>,
+}
+
+impl Tracer<'_> {
+    /// Adds one ray in each cell of a row.
+    #[cold]
+    fn sample(&mut self, row: usize, sums: &mut Sums) {
+        let (solved, samples) = (self.solved, &self.view.samples);
+        let (mut ahead, end) = (Ahead::default(), self.view.cells as u32);
+        let shift = samples.shift(row as isize);
+        let ray_of = |column: u32| samples.ray(row as isize, f64::from(column) + shift);
+        for column in 0..end {
+            let ray = ray_of(column);
+            let any = |n| if n == column { ray } else { ray_of(n) };
+            let hit = solved.bvh.closest_of(&mut ahead, column, end, any);
+            self.follow(&ray, hit, (row, column), sums);
+            self.add(if hit.is_some() { 1.0 } else { 0.0 }, sums);
+        }
+    }
+
+    /// Adds what a row shows, piece by piece without gaps: rays a cell apart or less stand for equal parts of each.
+    // apart: it does not burden the stack of the search for facets on a line, nor that its own
+    #[inline(never)]
+    fn spans(&mut self, row: usize, mut spans: impl Iterator<Item = Span> + Clone, sums: &mut Sums) {
+        // another place within the parts of each row: facets may be as regular as the cells
+        let (place, _) = Sequence::new(0x5160).pair(row as u32, 0);
+        let mut next = spans.next();
+        while let Some(first) = next {
+            let piece = spans.clone();
+            let mut end = first.end;
+            next = spans.next();
+            while let Some(span) = next
+                && span.start <= end + GAP
+            {
+                end = span.end;
+                next = spans.next();
+            }
+            self.piece((row, place), first, piece, end, sums);
+        }
+    }
+
+    /// Adds a piece of a row from the start of the span `first`, which others follow, to `end`.
+    fn piece(
+        &mut self,
+        (row, place): (usize, f64),
+        first: Span,
+        mut others: impl Iterator<Item = Span>,
+        end: f64,
+        sums: &mut Sums,
+    ) {
+        let length = end - first.start;
+        let parts = ceiling(length);
+        let share = length / f64::from(parts);
+        let mut span = first;
+        for part in 0..parts {
+            let at = first.start + share * (f64::from(part) + place);
+            while span.end <= at
+                && let Some(next) = others.next()
+            {
+                span = next;
+            }
+            let ray = self.view.samples.ray(row as isize, at);
+            let solved = self.solved;
+            let hit =
+                solved.bvh.closest_among(&ray, &[span.facet as u32]).or_else(|| solved.bvh.closest(&ray));
+            self.follow(&ray, hit, (row, at as u32), sums);
+            self.add(share, sums);
+        }
+    }
+
+    /// Finds the terms of a ray.
+    #[inline]
+    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, (row, index): (usize, u32), sums: &mut Sums) {
+        self.terms.clear(self.solved.shape.bands);
+        sums.rays += 1;
+        if hit.is_none() {
+            return;
+        }
+        let sample = Sample::OneOf { seed: row as u32, index };
+        let (seen, outlook) = ((ray, hit), &mut self.outlook);
+        let path = self.solved.radiance_with(seen, sample, self.terms, self.work, outlook);
+        sums.rays += u64::from(path.rays);
+    }
+
+    /// Adds what was found last for so many cells.
+    #[inline]
+    fn add(&self, cells: f64, sums: &mut Sums) {
+        let area = cells * self.area;
+        sums.area += area;
+        for (band, i) in sums.intensity.iter_mut().take(self.solved.shape.bands).enumerate() {
+            *i += self.terms.sum(band) * area;
+        }
+    }
+}
+
+/// The whole number at or above a positive one, at least 1.
+fn ceiling(x: f64) -> u32 {
+    let whole = x as u32;
+    whole + u32::from(f64::from(whole) < x || whole == 0)
+}
+
+/// What the sums say of one band.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Signature {
+    /// Radiant intensity toward the observer in W/sr.
+    pub intensity: f64,
+    /// Mean radiance of the object; 0 where nothing of it is seen.
+    pub mean_radiance: f64,
+    /// (mean radiance - background) / background; `None` where the background is 0.
+    pub contrast: Option<f64>,
+}
+
+impl Signature {
+    /// The signature in `band` against a background radiance.
+    pub fn new(sums: &Sums, band: usize, background: f64) -> Signature {
+        let intensity = sums.intensity.at(band);
+        let mean_radiance = if sums.area > 0.0 { intensity / sums.area } else { 0.0 };
+        let contrast = (background > 0.0).then(|| (mean_radiance - background) / background);
+        Signature { intensity, mean_radiance, contrast }
+    }
+}
