@@ -8,7 +8,7 @@ use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
 use blik_kernel::Error;
-use blik_kernel::bvh::{Ahead, Bvh};
+use blik_kernel::bvh::{AnswerBuffer, Bvh};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::{Mesh, Scene};
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn blik_closest_hits(
         let (handle, rays, out, mut runner) =
             unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
         runner.rows(out, 1, 1.0, |range, out| {
-            let (mut ahead, own) = (Ahead::default(), rays.get(range).unwrap_or_default());
+            let (mut ahead, own) = (AnswerBuffer::default(), rays.get(range).unwrap_or_default());
             let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));
             for (n, out) in (0..own.len() as u32).zip(out) {
                 let hit = handle.bvh.closest_of(&mut ahead, n, own.len() as u32, any);
@@ -309,7 +309,7 @@ pub unsafe extern "C" fn blik_any_hits(
         let (handle, rays, out, mut runner) =
             unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
         runner.rows(out, 1, 1.0, |range, out| {
-            let (mut ahead, own) = (Ahead::default(), rays.get(range).unwrap_or_default());
+            let (mut ahead, own) = (AnswerBuffer::default(), rays.get(range).unwrap_or_default());
             let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));
             for (n, out) in (0..own.len() as u32).zip(out) {
                 *out = u8::from(handle.bvh.occluded_of(&mut ahead, n, own.len() as u32, any));

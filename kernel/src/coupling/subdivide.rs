@@ -14,7 +14,7 @@ use crate::base::quarter::{Path, QUARTERS, out_of};
 use crate::base::simd::Isa;
 use crate::coupling::facing::{Clear, Facing, Receiver, WORDS};
 use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
-use crate::rays::bvh::{Ahead, Bvh};
+use crate::rays::bvh::{AnswerBuffer, Bvh};
 use crate::rays::surface::{Surface, opens_to_sky};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -403,7 +403,7 @@ impl Probe<'_> {
         sums: &mut Sums,
         backs: &mut [u32; POINTS],
     ) {
-        let mut ahead = Ahead::default();
+        let mut ahead = AnswerBuffer::default();
         let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.leave(direction);
         for ((n, sum), backs) in (0..POINTS as u32).zip(sums).zip(backs) {
             *sum += match self.bvh.closest_of(&mut ahead, n, POINTS as u32, any) {

@@ -1,8 +1,8 @@
-//! From polygon to polygon, nothing in the way.
+//! From polygon to polygon, nothing in the path.
 
 use super::contour;
 use super::convex::{Convex, double_area, edges, pieces};
-use super::patch::{Patch, Way, patches};
+use super::patch::{HalvingPath, Patch, patches};
 use super::rule::Rule;
 use crate::base::math::{FRAC_1_PI, Vec3, sqrt, unit};
 use crate::base::simd::Isa;
@@ -132,22 +132,22 @@ fn by_area(a: &Convex, na: Vec3, b: &Convex, nb: Vec3, splits: u32) -> Option<f6
 /// Halves two patches until each pair of parts is far enough apart for a rule, and gives those to `work`; none where that
 /// takes too many splits.
 ///
-/// Lower halves first. What waits is not kept on a stack: the way to a part, upper or lower half by level, says how to get
+/// Lower halves first. What waits is not kept on a stack: the path to a part, upper or lower half by level, says how to get
 /// it from the whole.
 fn split(a: &Patch, b: &Patch, left: &mut u32, work: &mut impl FnMut(&Patch, &Patch, Rule)) -> Option<()> {
     let (mut p, mut q) = (*a, *b);
-    let mut way = Way::default();
+    let mut path = HalvingPath::default();
     loop {
         if let Some(rule) = Patch::rule(&p, &q) {
             work(&p, &q, rule);
-            if !way.next() {
+            if !path.next() {
                 return Some(());
             }
             (p, q) = (*a, *b);
-            way.steps().for_each(|upper| halve(&mut p, &mut q, upper));
+            path.steps().for_each(|upper| halve(&mut p, &mut q, upper));
         } else {
             *left = left.checked_sub(1)?;
-            if !way.down(DEPTH) {
+            if !path.down(DEPTH) {
                 return None;
             }
             halve(&mut p, &mut q, false);

@@ -34,15 +34,15 @@ impl Points {
     const NONE: Points = Points { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], weight: [0.0; LANES] };
 }
 
-/// The way from a whole to a part of it that was halved again and again, and on to the next part: lower halves first.
+/// The path from a whole to a part of it that was halved again and again, and on to the next part: lower halves first.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Way {
+pub(super) struct HalvingPath {
     /// Bit n: whether step n leads to the upper half.
     upper: u32,
     steps: u32,
 }
 
-impl Way {
+impl HalvingPath {
     /// On to the lower half; false where that is more than so many steps, at most 32.
     pub(super) fn down(&mut self, most: u32) -> bool {
         if self.steps >= most {
@@ -84,7 +84,7 @@ impl Way {
 
     /// Whether each step leads to the upper half.
     pub(super) fn steps(&self) -> impl Iterator<Item = bool> + use<> {
-        let Way { upper, steps } = *self;
+        let HalvingPath { upper, steps } = *self;
         (0..steps).map(move |n| upper >> n & 1 == 1)
     }
 }

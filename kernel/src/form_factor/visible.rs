@@ -1,8 +1,8 @@
-//! Form factors with opaque triangles in the way.
+//! Form factors with opaque triangles in the path.
 
 use super::convex::{Convex, double_area, edges, pieces};
 use super::pair::{fronts, polygon_to_polygon};
-use super::patch::{Patch, Way, patches};
+use super::patch::{HalvingPath, Patch, patches};
 use super::point::point_to_polygon;
 use super::rule::GAUSS_3;
 use crate::base::error::Error;
@@ -251,36 +251,37 @@ impl Mean<'_> {
     /// 2.8 a halving and is shared by two: less than a quarter of the parent's is taken for chance.
     fn refined(&mut self, whole: &Patch, coarse: f64) -> Result<Estimate, Error> {
         let mut halvings = [Halving::default(); DEEPEST as usize];
-        let (mut way, mut patch, mut coarse, mut parent) = (Way::default(), *whole, coarse, f64::INFINITY);
+        let (mut path, mut patch, mut coarse, mut parent) =
+            (HalvingPath::default(), *whole, coarse, f64::INFINITY);
         loop {
             let (low, high) = (self.over(&patch.half(false))?, self.over(&patch.half(true))?);
             let difference = (low + high - coarse).abs();
             let error = difference.max(0.25 * parent);
             let within = error <= self.tolerance * patch.size() / sqrt(self.size);
-            let depth = way.depth();
-            if !(within && depth >= SHALLOWEST) && way.down(DEEPEST) {
+            let depth = path.depth();
+            if !(within && depth >= SHALLOWEST) && path.down(DEEPEST) {
                 halvings.set(depth as usize, Halving { difference, high, ..Halving::default() });
                 (patch, coarse, parent) = (patch.half(false), low, difference);
                 continue;
             }
             let mut done = Estimate { value: low + high, error };
-            while way.up() {
-                let Halving { low_value, low_error, .. } = halvings.at(way.depth() as usize);
+            while path.up() {
+                let Halving { low_value, low_error, .. } = halvings.at(path.depth() as usize);
                 done = Estimate { value: low_value + done.value, error: low_error + done.error };
             }
-            if !way.across() {
+            if !path.across() {
                 return Ok(done);
             }
-            if let Some(halving) = halvings.get_mut(way.depth() as usize - 1) {
+            if let Some(halving) = halvings.get_mut(path.depth() as usize - 1) {
                 (halving.low_value, halving.low_error) = (done.value, done.error);
                 (coarse, parent) = (halving.high, halving.difference);
             }
-            patch = way.steps().fold(*whole, |patch, upper| patch.half(upper));
+            patch = path.steps().fold(*whole, |patch, upper| patch.half(upper));
         }
     }
 }
 
-/// A patch that was halved, on the way to its halves' parts.
+/// A patch that was halved, on the path to its halves' parts.
 #[derive(Clone, Copy, Default)]
 struct Halving {
     /// How far both resolutions were apart.

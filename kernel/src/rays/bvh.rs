@@ -11,9 +11,9 @@ mod collapse;
 mod external;
 #[cfg(feature = "std")]
 mod obvhs;
+mod path_stack;
 mod stream;
 mod traverse;
-mod way;
 mod within;
 
 use crate::base::arena::{Arena, Need};
@@ -26,9 +26,9 @@ use crate::rays::ray::{self, Hit, Ray};
 use build::{Binary, Facets};
 use external::External;
 
-pub use external::{Ahead, BATCH, Intersector, NO_FACET};
+pub use external::{AnswerBuffer, BATCH, Intersector, NO_FACET};
 pub(crate) use stream::GROUP;
-pub(crate) use within::Half;
+pub(crate) use within::HalfSpace;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
 /// and high is minus infinity.

@@ -8,7 +8,7 @@ use crate::base::error::{Error, Field};
 use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::{clamp, fabs, floor, narrow, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
-use crate::rays::bvh::Ahead;
+use crate::rays::bvh::AnswerBuffer;
 use crate::rays::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::{Camera, Sampling};
@@ -426,7 +426,7 @@ impl<'a> Painter<'a, '_> {
     ) {
         self.primary.draw(self.solved, self.camera, row);
         self.tally.primary += columns.len() as u64;
-        let mut ahead = Ahead::default();
+        let mut ahead = AnswerBuffer::default();
         let skips = self.primary.draws && self.camera.is_parallel();
         let mut j = columns.start;
         while j < columns.end {
@@ -465,7 +465,7 @@ impl<'a> Painter<'a, '_> {
     #[inline]
     fn first_hit(
         &self,
-        ahead: &mut Ahead,
+        ahead: &mut AnswerBuffer,
         ray: &Ray,
         facet: u32,
         (row, column): (isize, isize),
@@ -675,7 +675,7 @@ impl<'a> Painter<'a, '_> {
         self.board.sums.clear(bands);
         self.board.squares.head_mut(bands).fill(0.0);
         let (mut n, mut goal) = (0u32, FEWEST);
-        let (mut error, mut ahead) = (0.0, Ahead::default());
+        let (mut error, mut ahead) = (0.0, AnswerBuffer::default());
         while n < goal {
             let camera = &self.camera;
             let any = |n: u32| {

@@ -14,7 +14,7 @@ use crate::base::arena::{Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, fabs, floor, sqrt, unit};
-use crate::rays::bvh::{Bvh, Half};
+use crate::rays::bvh::{Bvh, HalfSpace};
 use crate::rays::ray::Ray;
 use core::ops::Range;
 
@@ -282,7 +282,7 @@ impl<'a> View<'a> {
     }
 
     /// What is seen on the rows and columns, and a little more.
-    fn region(&self) -> [Half; 5] {
+    fn region(&self) -> [HalfSpace; 5] {
         let s = self.samples;
         let along = |axis: Vec3, origin: f64, step: f64, at: f64, side: f64| {
             // axis.m - (origin + step at) w has the sign of `side` times the step's
@@ -291,7 +291,7 @@ impl<'a> View<'a> {
             let normal = if s.parallel { axis } else { axis - s.forward * offset };
             let height = if s.parallel { normal.dot(s.eye) + offset } else { normal.dot(s.eye) };
             let length = sqrt(normal.dot(normal));
-            Half { normal: normal * (side / length), height: height * (side / length) }
+            HalfSpace { normal: normal * (side / length), height: height * (side / length) }
         };
         let up = s.up - s.right * s.shear;
         let level = s.first.1 - s.shear * s.first.0;
@@ -302,7 +302,7 @@ impl<'a> View<'a> {
             along(up, level, s.step.1, bottom, -1.0),
             along(s.right, s.first.0, s.step.0, left, 1.0),
             along(s.right, s.first.0, s.step.0, right, -1.0),
-            Half { normal: s.forward, height: s.forward.dot(s.eye) },
+            HalfSpace { normal: s.forward, height: s.forward.dot(s.eye) },
         ]
     }
 

@@ -5,7 +5,7 @@ use crate::base::error::Error;
 use crate::base::index::Index;
 use crate::base::math::{Vec3, frame, unit};
 use crate::base::qmc::Sequence;
-use crate::rays::bvh::Ahead;
+use crate::rays::bvh::AnswerBuffer;
 use crate::rays::ray::{Hit, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::Camera;
@@ -198,7 +198,7 @@ impl Tracer<'_> {
     #[cold]
     fn sample(&mut self, row: usize, sums: &mut Sums) {
         let (solved, samples) = (self.solved, &self.view.samples);
-        let (mut ahead, end) = (Ahead::default(), self.view.cells as u32);
+        let (mut ahead, end) = (AnswerBuffer::default(), self.view.cells as u32);
         let shift = samples.shift(row as isize);
         let ray_of = |column: u32| samples.ray(row as isize, f64::from(column) + shift);
         for column in 0..end {

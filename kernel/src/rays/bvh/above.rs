@@ -1,6 +1,6 @@
 //! Whether anything of the mesh rises above a plane: if not, no ray that starts there and goes up meets anything.
 
-use super::way::{START, deepest, enter};
+use super::path_stack::{EMPTY, push, top};
 use super::{Bvh, LEAF, PAIR};
 use crate::base::math::Vec3;
 
@@ -8,9 +8,9 @@ use crate::base::math::Vec3;
 #[inline(never)]
 pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
     let n = normal.to_array();
-    let (mut way, mut depth) = (START, 0);
-    enter(&mut way, &mut depth, 0, 0xff);
-    while let Some((node, left)) = deepest(&mut way, &mut depth) {
+    let (mut stack, mut depth) = (EMPTY, 0);
+    push(&mut stack, &mut depth, 0, 0xff);
+    while let Some((node, left)) = top(&mut stack, &mut depth) {
         let i = left.trailing_zeros() as usize & 7;
         *left &= *left - 1;
         let node = *node as usize;
@@ -26,7 +26,7 @@ pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
             continue;
         }
         if children[i] & LEAF == 0 {
-            enter(&mut way, &mut depth, children[i], 0xff);
+            push(&mut stack, &mut depth, children[i], 0xff);
         } else if leaf_rises(bvh, children[i], normal, height) {
             return true;
         }

@@ -107,15 +107,15 @@ impl External<'_> {
     }
 }
 
-/// A tracer's answers to some rays of a numbered series, asked for together.
+/// Buffer of a tracer's answers to consecutive rays of a numbered series, asked for together.
 #[derive(Debug, Default)]
-pub struct Ahead {
+pub struct AnswerBuffer {
     answers: [u32; BATCH],
     first: u32,
     count: u32,
 }
 
-impl Ahead {
+impl AnswerBuffer {
     /// Forgets all answers: before another series.
     pub fn clear(&mut self) {
         self.count = 0;
@@ -153,7 +153,7 @@ impl Bvh<'_> {
     #[inline(always)]
     pub fn closest_of(
         &self,
-        ahead: &mut Ahead,
+        ahead: &mut AnswerBuffer,
         number: u32,
         end: u32,
         ray: impl Fn(u32) -> Ray,
@@ -166,7 +166,13 @@ impl Bvh<'_> {
 
     /// [`Bvh::occluded`] of ray `number` of a series, as [`Bvh::closest_of`].
     #[inline(always)]
-    pub fn occluded_of(&self, ahead: &mut Ahead, number: u32, end: u32, ray: impl Fn(u32) -> Ray) -> bool {
+    pub fn occluded_of(
+        &self,
+        ahead: &mut AnswerBuffer,
+        number: u32,
+        end: u32,
+        ray: impl Fn(u32) -> Ray,
+    ) -> bool {
         let Some(external) = &self.external else { return traverse::occluded(self, &ray(number)) };
         ahead.answer(number, end, &ray, &|rays, hits| external.any_batch(self, rays, hits)) != 0
     }

@@ -4,7 +4,7 @@
 //! and nothing that a ray finds decides where another goes, so that the processor works ahead. Children follow in the
 //! order of their distance from the ray to which they are nearest.
 
-use super::traverse::{self, Beam, SHORT, Walk};
+use super::traverse::{self, LaneRay, SHORT, TraversalRay};
 use super::{Bvh, LEAF, PAIR, STACK};
 use crate::base::index::IndexMut;
 use crate::base::simd::{self, LaneTask, Lanes};
@@ -78,11 +78,11 @@ impl<const N: usize> LaneTask for Search<'_, N> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let mut walks = [Walk::IDLE; GROUP];
+        let mut walks = [TraversalRay::IDLE; GROUP];
         let mut alive = [0; WORDS];
         for (i, ((walk, ray), hit)) in walks.iter_mut().zip(self.rays).zip(&mut *self.hits).enumerate() {
             *hit = None;
-            if let Some(begun) = Walk::new(self.bvh, ray) {
+            if let Some(begun) = TraversalRay::new(self.bvh, ray) {
                 *walk = begun;
                 alive[i / 32 % WORDS] |= 1 << (i % 32);
             }
@@ -99,7 +99,7 @@ struct Group<'a, L> {
     bvh: &'a Bvh<'a>,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
-    walks: &'a mut [Walk; GROUP],
+    walks: &'a mut [TraversalRay; GROUP],
     /// Rays that still look for a hit.
     alive: Set,
     any: bool,
@@ -143,7 +143,7 @@ impl<L: Lanes> Group<'_, L> {
                 let bit = left & left.wrapping_neg();
                 let walk = &self.walks[(word * 32 + left.trailing_zeros() as usize) % GROUP];
                 left ^= bit;
-                let (near, far) = Beam::new(lanes, walk).slabs(boxes, walk.limit);
+                let (near, far) = LaneRay::new(lanes, walk).slabs(boxes, walk.limit);
                 let mask = lanes.mask8(near, far);
                 met = lanes.mark8(met, mask, bit);
                 nearest = lanes.min8(lanes.choose8(mask, near, infinite), nearest);
@@ -186,7 +186,7 @@ impl<L: Lanes> Group<'_, L> {
                     let number = (word * 32 + left.trailing_zeros() as usize) % GROUP;
                     left &= left - 1;
                     let walk = &self.walks[number];
-                    let inside = Beam::new(self.lanes, walk).inside(packet);
+                    let inside = LaneRay::new(self.lanes, walk).inside(packet);
                     found[count % GROUP] = (number as u8, inside as u8);
                     count += usize::from((inside != 0) & (walk.limit >= near));
                 }

@@ -17,7 +17,7 @@
 #[cfg(not(target_pointer_width = "32"))]
 use super::STACK;
 #[cfg(target_pointer_width = "32")]
-use super::way::{self, Way};
+use super::path_stack::{self, PathStack};
 use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, Slack};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
@@ -63,55 +63,69 @@ fn search(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
     if is_short(bvh) { search_short(bvh, ray, any) } else { search_deep(bvh, ray, any) }
 }
 
-/// Apart, so that its stack is no burden to who has a deep tree.
+/// Search with the short stack. Not inlined: the frame of deep trees' search stays free of it.
 #[inline(never)]
 fn search_short(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<[u64; SHORT]> { bvh, ray, any, left: PhantomData })
+    simd::run_lanes(bvh.isa, Search::<[u64; SHORT]> { bvh, ray, any, stack: PhantomData })
 }
 
-/// Apart, so that only who has a deep tree pays for the long stack.
+/// Search with the long stack. Not inlined: its frame is paid for by deep trees alone.
 #[inline(never)]
 pub(super) fn search_deep(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
     #[cfg(target_pointer_width = "32")]
-    return simd::run_lanes(bvh.isa, Search::<Way> { bvh, ray, any, left: PhantomData });
+    return simd::run_lanes(bvh.isa, Search::<PathStack> { bvh, ray, any, stack: PhantomData });
     #[cfg(not(target_pointer_width = "32"))]
-    simd::run_lanes(bvh.isa, Search::<[u64; STACK]> { bvh, ray, any, left: PhantomData })
+    simd::run_lanes(bvh.isa, Search::<[u64; STACK]> { bvh, ray, any, stack: PhantomData })
 }
 
 /// The search for the first hit, or for any: not two searches, which would be twice the code.
-struct Search<'a, W: Left> {
+struct Search<'a, S: Stack> {
     bvh: &'a Bvh<'a>,
     ray: &'a Ray,
     any: bool,
-    left: PhantomData<W>,
+    stack: PhantomData<S>,
 }
 
-impl<W: Left> LaneTask for Search<'_, W> {
+impl<S: Stack> LaneTask for Search<'_, S> {
     type Out = Option<Hit>;
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> Option<Hit> {
-        Walk::new(self.bvh, self.ray)?.search::<L, W>(lanes, self.bvh, self.ray, self.any)
+        TraversalRay::new(self.bvh, self.ray)?.search::<L, S>(lanes, self.bvh, self.ray, self.any)
     }
 }
 
-/// What is left to visit of a search; how much stands apart, so that compilers keep it in a register.
-trait Left {
-    /// Nothing.
-    const NONE: Self;
-    /// Adds the children of a node that the ray meets (`hits`, as bits; not 0) and enters at `near`, but for the nearest,
-    /// which it returns.
-    fn add(&mut self, top: &mut usize, node: u32, children: &[u32; 8], near: &[f32; 8], hits: u32) -> u32;
-    /// Takes the next child that the ray enters before its limit.
-    fn take(&mut self, top: &mut usize, walk: &Walk, bvh: &Bvh) -> Option<u32>;
+/// Stack of the nodes that a search has yet to visit. Its height stands apart, so that compilers keep it in a register.
+trait Stack {
+    /// The empty stack.
+    const EMPTY: Self;
+    /// Pushes the children of a node that the ray meets (`hits`, as bits; not 0) and enters at `near`, but for the
+    /// nearest, which it returns.
+    fn push_children(
+        &mut self,
+        top: &mut usize,
+        node: u32,
+        children: &[u32; 8],
+        near: &[f32; 8],
+        hits: u32,
+    ) -> u32;
+    /// Pops the next child that the ray enters before its limit.
+    fn pop(&mut self, top: &mut usize, ray: &TraversalRay, bvh: &Bvh) -> Option<u32>;
 }
 
 /// Children with the distances at which the ray enters them.
-impl<const N: usize> Left for [u64; N] {
-    const NONE: Self = [0; N];
+impl<const N: usize> Stack for [u64; N] {
+    const EMPTY: Self = [0; N];
 
     #[inline(always)]
-    fn add(&mut self, top: &mut usize, _: u32, children: &[u32; 8], near: &[f32; 8], mut hits: u32) -> u32 {
+    fn push_children(
+        &mut self,
+        top: &mut usize,
+        _: u32,
+        children: &[u32; 8],
+        near: &[f32; 8],
+        mut hits: u32,
+    ) -> u32 {
         let entry = |hits: u32| {
             let child = hits.trailing_zeros() as usize & 7;
             u64::from(near[child].to_bits()) << 32 | u64::from(children[child])
@@ -129,11 +143,11 @@ impl<const N: usize> Left for [u64; N] {
     }
 
     #[inline(always)]
-    fn take(&mut self, top: &mut usize, walk: &Walk, _: &Bvh) -> Option<u32> {
+    fn pop(&mut self, top: &mut usize, ray: &TraversalRay, _: &Bvh) -> Option<u32> {
         while *top > 0 {
             *top -= 1;
             let entry = self.get(*top).copied()?;
-            if f32::from_bits((entry >> 32) as u32) <= walk.limit {
+            if f32::from_bits((entry >> 32) as u32) <= ray.limit {
                 return Some(entry as u32);
             }
         }
@@ -141,14 +155,14 @@ impl<const N: usize> Left for [u64; N] {
     }
 }
 
-/// A seventh of that: nodes with the places of their children, four bits each, the nearest lowest, whose distances are
-/// computed again.
+/// Nodes with the places of their children, four bits each, the nearest lowest; their distances are computed again. It
+/// takes a seventh of the memory of children with distances.
 #[cfg(target_pointer_width = "32")]
-impl Left for Way {
-    const NONE: Self = way::START;
+impl Stack for PathStack {
+    const EMPTY: Self = path_stack::EMPTY;
 
     #[inline(always)]
-    fn add(
+    fn push_children(
         &mut self,
         top: &mut usize,
         node: u32,
@@ -165,27 +179,28 @@ impl Left for Way {
         }
         let last = count.saturating_sub(1);
         let others = sorted.head(last).iter().fold(0, |places, &entry| places << 4 | 8 | entry as u32);
-        way::enter(self, top, node, others);
+        path_stack::push(self, top, node, others);
         children[sorted.at(last) as usize & 7]
     }
 
     #[inline(always)]
-    fn take(&mut self, top: &mut usize, walk: &Walk, bvh: &Bvh) -> Option<u32> {
+    fn pop(&mut self, top: &mut usize, ray: &TraversalRay, bvh: &Bvh) -> Option<u32> {
         loop {
-            let (node, places) = way::deepest(self, top)?;
+            let (node, places) = path_stack::top(self, top)?;
             let child = *places as usize & 7;
             *places >>= 4;
             let (boxes, children) = (bvh.boxes.get(*node as usize)?, bvh.children.get(*node as usize)?);
-            if walk.entry(boxes, child) <= walk.limit {
+            if ray.entry(boxes, child) <= ray.limit {
                 return Some(children[child]);
             }
         }
     }
 }
 
-/// A ray on its way. Axes are four, so that the compiler takes them together.
+/// A ray prepared for the traversal: origin and inverse direction in f32, limits, shear. Axes are four, so that the
+/// compiler takes them together.
 #[derive(Clone, Copy)]
-pub(super) struct Walk {
+pub(super) struct TraversalRay {
     /// Origin for the near and the far sides, and 1/direction.
     near: [f32; 4],
     far: [f32; 4],
@@ -207,9 +222,9 @@ pub(super) struct Walk {
     nearest: f64,
 }
 
-impl Walk {
+impl TraversalRay {
     /// No ray.
-    pub const IDLE: Walk = Walk {
+    pub const IDLE: TraversalRay = TraversalRay {
         near: [0.0; 4],
         far: [0.0; 4],
         inverse: [0.0; 4],
@@ -252,7 +267,7 @@ impl Walk {
         let [first, second] = NEXT.at(along);
         let outward = pad as f32;
         let away = inverse.map(|c| if c < 0.0 { -outward } else { outward });
-        let mut walk = Walk {
+        let mut walk = TraversalRay {
             near: [origin[0] + away[0], origin[1] + away[1], origin[2] + away[2], origin[3] + away[3]],
             far: [origin[0] - away[0], origin[1] - away[1], origin[2] - away[2], origin[3] - away[3]],
             inverse,
@@ -278,11 +293,11 @@ impl Walk {
         self.limit = (t - self.start + self.pad) as f32 * WIDEN;
     }
 
-    /// The walk itself: nearest child first, the rest on the stack with their distances.
+    /// Depth-first traversal: nearest child first, the rest on the stack with their distances.
     #[inline(always)]
-    fn search<L: Lanes, W: Left>(mut self, lanes: L, bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
-        let beam = Beam::new(lanes, &self);
-        let (mut left, mut top) = (W::NONE, 0);
+    fn search<L: Lanes, S: Stack>(mut self, lanes: L, bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
+        let beam = LaneRay::new(lanes, &self);
+        let (mut stack, mut top) = (S::EMPTY, 0);
         let mut best = None;
         let mut next = if bvh.boxes.is_empty() { return None } else { 0 };
         loop {
@@ -292,7 +307,7 @@ impl Walk {
                 let (near, far) = beam.slabs(boxes, self.limit);
                 let hits = lanes.le8(near, far);
                 if hits != 0 {
-                    next = left.add(&mut top, next, children, &lanes.store8(near), hits);
+                    next = stack.push_children(&mut top, next, children, &lanes.store8(near), hits);
                     continue;
                 }
             } else {
@@ -301,12 +316,12 @@ impl Walk {
                     return best;
                 }
             }
-            let Some(child) = left.take(&mut top, &self, bvh) else { return best };
+            let Some(child) = stack.pop(&mut top, &self, bvh) else { return best };
             next = child;
         }
     }
 
-    /// Where the ray enters one of a node's boxes that it meets: as [`Beam::slabs`] has it.
+    /// Where the ray enters one of a node's boxes that it meets: as [`LaneRay::slabs`] has it.
     #[cfg(target_pointer_width = "32")]
     #[inline(always)]
     fn entry(&self, boxes: &Boxes, child: usize) -> f32 {
@@ -320,7 +335,7 @@ impl Walk {
 
     /// Tests the packets of a leaf.
     #[inline(always)]
-    fn leaf<L: Lanes>(&mut self, beam: &Beam<L>, bvh: &Bvh, ray: &Ray, leaf: u32, best: &mut Option<Hit>) {
+    fn leaf<L: Lanes>(&mut self, beam: &LaneRay<L>, bvh: &Bvh, ray: &Ray, leaf: u32, best: &mut Option<Hit>) {
         let first = (leaf & !(LEAF | PAIR)) as usize;
         for index in first..=first + usize::from(leaf & PAIR != 0) {
             let Some(lanes) = bvh.lanes(index) else { return };
@@ -328,7 +343,7 @@ impl Walk {
         }
     }
 
-    /// Takes the best hit with the facets of a packet that are in the set.
+    /// Exact test in f64 of the facets of a packet that the f32 test left in the set; keeps the best hit.
     #[inline(always)]
     pub fn confirm(
         &mut self,
@@ -362,8 +377,8 @@ impl Walk {
     }
 }
 
-/// What the lanes need of a ray.
-pub(super) struct Beam<L: Lanes> {
+/// A traversal ray in every lane.
+pub(super) struct LaneRay<L: Lanes> {
     lanes: L,
     side: [u8; 3],
     near: [L::Same; 3],
@@ -376,21 +391,21 @@ pub(super) struct Beam<L: Lanes> {
     error: f32,
 }
 
-impl<L: Lanes> Beam<L> {
+impl<L: Lanes> LaneRay<L> {
     #[inline(always)]
-    pub fn new(lanes: L, walk: &Walk) -> Self {
-        let (n, f, i, o) = (walk.near, walk.far, walk.inverse, walk.origin);
-        Beam {
+    pub fn new(lanes: L, ray: &TraversalRay) -> Self {
+        let (n, f, i, o) = (ray.near, ray.far, ray.inverse, ray.origin);
+        LaneRay {
             lanes,
-            side: walk.side,
+            side: ray.side,
             near: [lanes.same(n[0]), lanes.same(n[1]), lanes.same(n[2])],
             far: [lanes.same(f[0]), lanes.same(f[1]), lanes.same(f[2])],
             inverse: [lanes.same(i[0]), lanes.same(i[1]), lanes.same(i[2])],
-            skip: walk.skip,
-            axes: walk.axes,
+            skip: ray.skip,
+            axes: ray.axes,
             origin: [lanes.same(o[0]), lanes.same(o[1]), lanes.same(o[2])],
-            shear: [lanes.same(walk.shear[0]), lanes.same(walk.shear[1])],
-            error: walk.error,
+            shear: [lanes.same(ray.shear[0]), lanes.same(ray.shear[1])],
+            error: ray.error,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Which facets reach into a convex region: those of a row of pixels, or those that may stand in the way of parallel
 //! rays that leave a facet.
 
-use super::way::{START, deepest, enter};
+use super::path_stack::{EMPTY, push, top};
 use super::{Boxes, Bvh, LANES, LEAF, PAIR, Packet};
 use crate::base::math::{Vec3, fabs};
 use crate::base::simd::{self, LaneTask, Lanes};
@@ -9,7 +9,7 @@ use crate::rays::ray::{Hit, Line, Ray};
 
 /// A half space: points p with p.normal >= height; `normal` is a unit vector.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Half {
+pub(crate) struct HalfSpace {
     pub normal: Vec3,
     pub height: f64,
 }
@@ -23,7 +23,7 @@ impl Bvh<'_> {
     /// Calls `visit` with all facets that reach into the region common to all halves, and maybe others, until it
     /// returns false. A facet is left out where all its corners are outside of one half for certain: to 4 roundings of
     /// a coordinate and of the height.
-    pub(crate) fn within<const N: usize>(&self, halves: &[Half; N], visit: impl FnMut(u32) -> bool) {
+    pub(crate) fn within<const N: usize>(&self, halves: &[HalfSpace; N], visit: impl FnMut(u32) -> bool) {
         simd::run_lanes(self.isa, Within { bvh: self, halves, visit });
     }
 
@@ -62,7 +62,7 @@ impl Bvh<'_> {
 
 struct Within<'a, F, const N: usize> {
     bvh: &'a Bvh<'a>,
-    halves: &'a [Half; N],
+    halves: &'a [HalfSpace; N],
     visit: F,
 }
 
@@ -72,11 +72,11 @@ impl<F: FnMut(u32) -> bool, const N: usize> LaneTask for Within<'_, F, N> {
     #[inline(always)]
     fn run<L: Lanes>(mut self, lanes: L) {
         let bvh = self.bvh;
-        let mut planes = [Plane::new(lanes, &Half { normal: Vec3::ZERO, height: 0.0 }, 0.0); N];
+        let mut planes = [Plane::new(lanes, &HalfSpace { normal: Vec3::ZERO, height: 0.0 }, 0.0); N];
         for (plane, half) in planes.iter_mut().zip(self.halves) {
             *plane = Plane::new(lanes, half, bvh.scale);
         }
-        let (mut way, mut depth) = (START, 0);
+        let (mut stack, mut depth) = (EMPTY, 0);
         let mut next = 0;
         loop {
             if next & LEAF == 0 {
@@ -86,11 +86,11 @@ impl<F: FnMut(u32) -> bool, const N: usize> LaneTask for Within<'_, F, N> {
                 for plane in &planes {
                     reached &= plane.reached_by_boxes(boxes);
                 }
-                enter(&mut way, &mut depth, next, reached);
+                push(&mut stack, &mut depth, next, reached);
             } else if !self.leaf(&planes, next) {
                 return;
             }
-            let Some((node, left)) = deepest(&mut way, &mut depth) else { return };
+            let Some((node, left)) = top(&mut stack, &mut depth) else { return };
             let child = left.ilog2() as usize & 7;
             *left &= !(1 << child);
             let Some(children) = bvh.children.get(*node as usize) else { return };
@@ -151,7 +151,7 @@ struct Plane<L: Lanes> {
 
 impl<L: Lanes> Plane<L> {
     #[inline(always)]
-    fn new(lanes: L, half: &Half, scale: f64) -> Plane<L> {
+    fn new(lanes: L, half: &HalfSpace, scale: f64) -> Plane<L> {
         let [x, y, z] = half.normal.to_array();
         let height = half.height - SLACK32 * (scale + fabs(half.height));
         Plane {

@@ -6,7 +6,7 @@ use super::gather::GATHERS;
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, frame, sqrt};
-use crate::rays::bvh::Half;
+use crate::rays::bvh::HalfSpace;
 use crate::rays::surface::Surface;
 
 /// What irradiance over pi may be wrong by beside such things, relative to the reference radiance.
@@ -80,7 +80,7 @@ impl Solved<'_> {
         let reach = NEAR * SMALL * near.size;
         let half = |normal: Vec3, below: f64| {
             let least = corners.iter().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
-            Half { normal, height: least - below }
+            HalfSpace { normal, height: least - below }
         };
         let halves = [
             half(x, reach),

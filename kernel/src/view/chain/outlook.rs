@@ -5,7 +5,7 @@ use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
 use crate::radiosity::sun_image::SAME;
-use crate::rays::bvh::Half;
+use crate::rays::bvh::HalfSpace;
 use crate::rays::surface::{OFFSET, Surface};
 use crate::scene::NO_MIRROR;
 
@@ -132,14 +132,14 @@ impl Way {
         let normal = surface.normal;
         let top = corners.iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
         // rays start twice as high
-        let plane = Half { normal, height: top + 0.5 * OFFSET };
+        let plane = HalfSpace { normal, height: top + 0.5 * OFFSET };
         let mut halves = [plane; 4];
         let [a, b, c] = corners;
         for (half, (from, to, other)) in
             halves.part_mut(1..4).iter_mut().zip([(a, b, c), (b, c, a), (c, a, b)])
         {
             let Some(inward) = inward(to - from, other - from, direction, spread) else { return };
-            *half = Half { normal: inward, height: inward.dot(from).min(inward.dot(to)) - MARGIN };
+            *half = HalfSpace { normal: inward, height: inward.dot(from).min(inward.dot(to)) - MARGIN };
         }
         let (mut count, own) = (0, surface.facet as u32);
         // of what is in the way to an image of the sun, the mirrors that may show it count

@@ -3,7 +3,7 @@
 use super::{NOTES, Painter};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, unit};
-use crate::rays::bvh::Half;
+use crate::rays::bvh::HalfSpace;
 use core::ops::Range;
 
 impl Painter<'_, '_> {
@@ -67,9 +67,9 @@ impl Painter<'_, '_> {
             let normal = unit(one.direction.cross(along)).unwrap_or(Vec3::ZERO);
             let height = normal.dot(one.origin);
             if normal.dot(inside) >= height {
-                Half { normal, height }
+                HalfSpace { normal, height }
             } else {
-                Half { normal: -normal, height: -height }
+                HalfSpace { normal: -normal, height: -height }
             }
         });
         let mut found = false;
