@@ -14,7 +14,7 @@ use blik_kernel::plane::host::Settings;
 use blik_kernel::plane::light::{Light, Sky};
 use blik_kernel::plane::rows::{self, Method, RowInfo, RowSettings};
 use blik_kernel::plane::scene::{Basis, BodyInput, PlaneInput, PlaneMaterial, PlaneScene, RaySet, Shape};
-use blik_kernel::plane::view::Scratch;
+use blik_kernel::plane::scratch::Scratch;
 use blik_kernel::{Error, Field};
 use plane_kernel::{SAMPLES, eps, flat, image, method, pair, solve, uniform, variants};
 use plane_reference::diffuse::{Resolution, Solution};

@@ -17,7 +17,7 @@ use crate::run::{Runner, Start};
 use crate::status::*;
 use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::plane::scene::PlaneScene;
-use blik_kernel::plane::view::Scratch;
+use blik_kernel::plane::scratch::Scratch;
 use core::ffi::c_void;
 use core::ops::Range;
 

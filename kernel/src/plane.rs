@@ -10,7 +10,7 @@
 //! | visibility | [`view`] | a point → what it sees, as spans between silhouettes |
 //! | chains | [`trace`] | a ray → what it meets by way of mirrors and [`lobe`]s |
 //! | coupling | [`rows`] | eq. (12): rows of extended form factors |
-//! | light | [`light`] | sky and sun on every unknown, also by way of mirrors |
+//! | light | [`light`], [`direct`] | sky and sun; what they bring every unknown, also by way of mirrors |
 //! | solution | [`solve`] | eq. (12) solved, with [`crate::radiosity`]'s bounds |
 //! | image | [`image`] | eq. (15) along each ray |
 //!
@@ -18,14 +18,18 @@
 //! a span is half the difference of the sines. One spectral band: more bands are more runs. Lengths are in any
 //! unit, radiance in any; E, the sun's normal irradiance, is radiance times angle.
 
+pub mod direct;
 mod fork;
 #[cfg(feature = "std")]
 pub mod host;
 pub mod image;
 pub mod light;
 pub mod lobe;
+mod nodes;
+pub(crate) mod path;
 pub mod rows;
 pub mod scene;
+pub mod scratch;
 pub mod settings;
 pub mod solve;
 pub mod stencil;

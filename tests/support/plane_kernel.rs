@@ -12,7 +12,7 @@ use blik_kernel::plane::rows::Method;
 use blik_kernel::plane::scene::{
     Basis, BodyInput, PlaneGloss, PlaneInput, PlaneMaterial, RaySet, Shape as Body,
 };
-use blik_kernel::plane::view::Scratch;
+use blik_kernel::plane::scratch::Scratch;
 
 /// Samples of an image, as the study has them.
 pub const SAMPLES: usize = 1000;

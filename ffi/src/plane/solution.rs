@@ -10,8 +10,9 @@ use crate::types::read;
 use crate::{call, caught};
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::plane::Vec2;
+use blik_kernel::plane::direct;
 use blik_kernel::plane::image::Solved;
-use blik_kernel::plane::light::{self, Capture, Light, MAX_JUMPS, PlaneSun, RadianceOf, Sky};
+use blik_kernel::plane::light::{Capture, Light, MAX_JUMPS, PlaneSun, RadianceOf, Sky};
 use blik_kernel::plane::solve::{Relaxed, System};
 use core::ffi::c_void;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -242,7 +243,7 @@ fn build(
             let open = coupling.open.get(range.start * classes..range.end * classes).unwrap_or_default();
             // SAFETY: ranges are disjoint and within the unknowns.
             let out = unsafe { part(&start, &range, classes) };
-            Ok(light::fill(scene, &light, &rows, range, open, out, scratch)?)
+            Ok(direct::fill(scene, &light, &rows, range, open, out, scratch)?)
         })?;
         let system = System::new(scene, coupling.matrix, direct)?;
         let goal = settings.max_bounces.is_none().then_some(settings.solver);

@@ -12,7 +12,8 @@ use blik_kernel::math::sqrt;
 use blik_kernel::plane::Vec2;
 use blik_kernel::plane::image::View;
 use blik_kernel::plane::lobe::PlaneLobe;
-use blik_kernel::plane::view::{Scratch, Span, sweep};
+use blik_kernel::plane::scratch::{Scratch, sweep};
+use blik_kernel::plane::view::Span;
 use core::ffi::c_void;
 
 /// What a ray of the plane brings.

@@ -2,7 +2,8 @@
 
 use super::draw::Draw;
 use super::families::FAMILIES;
-use super::light::{Suns, lights};
+use super::light::lights;
+use super::setting::{Eye, Setting};
 use crate::support::scenes::Mesh;
 use crate::support::twin::{Material, Scene, Sky, Sun};
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
@@ -10,71 +11,6 @@ use glam::{DVec3, dvec3};
 
 /// How many cases there are: thirteen of each kind.
 pub const CASES: usize = 13 * FAMILIES.len();
-
-/// From where a scene is looked at.
-#[derive(Clone, Copy, Debug)]
-pub enum Eye {
-    /// From 10 to 70 degrees above.
-    Outside,
-    /// From any side.
-    Around,
-    /// From 40 to 85 degrees above.
-    Above,
-    /// From the octant x, y, z > 0.
-    Octant,
-    /// From within a room of this size on z = 0.
-    Within(DVec3),
-}
-
-/// A kind's scene before light and camera are drawn.
-pub struct Setting {
-    mesh: Mesh,
-    materials: Vec<Material>,
-    two_sided: bool,
-    sun: f64,
-    suns: Suns,
-    dark: bool,
-    rough: bool,
-    eye: Eye,
-}
-
-impl Setting {
-    /// One-sided, seen from outside, half the time in the sun.
-    pub fn new(mesh: Mesh, materials: Vec<Material>) -> Setting {
-        let (suns, eye) = (Suns::Any, Eye::Outside);
-        Setting { mesh, materials, two_sided: false, sun: 0.5, suns, dark: false, rough: false, eye }
-    }
-
-    /// With a sun with the probability `p`.
-    pub fn sun(self, p: f64) -> Setting {
-        Setting { sun: p, ..self }
-    }
-
-    /// With suns of this kind.
-    pub fn suns(self, suns: Suns) -> Setting {
-        Setting { suns, ..self }
-    }
-
-    /// Seen from there.
-    pub fn eye(self, eye: Eye) -> Setting {
-        Setting { eye, ..self }
-    }
-
-    /// Both sides alike.
-    pub fn two_sided(self) -> Setting {
-        Setting { two_sided: true, ..self }
-    }
-
-    /// Without sky and sun.
-    pub fn dark(self) -> Setting {
-        Setting { dark: true, ..self }
-    }
-
-    /// Too noisy a reference for the smallest tolerance.
-    pub fn rough(self) -> Setting {
-        Setting { rough: true, ..self }
-    }
-}
 
 /// A scene, its light, a view and a tolerance.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! The kinds of scenes: bodies and materials of each, drawn.
 
-use super::case::{Eye, Setting};
 use super::draw::Draw;
 use super::light::{Suns, diffuse, glossy, material, mirror};
+use super::setting::{Eye, Setting};
 use super::shapes::{craft, cuboid, cylinder, dish, floor, revolved, room, room_with_hole, sheet, terrain};
 use crate::support::scenes::{Mesh, box_open, corner, sphere};
 use glam::{DVec3, dvec3};

@@ -35,6 +35,7 @@ mod light;
 mod options;
 mod pixels;
 mod reference;
+mod setting;
 mod shapes;
 mod verify;
 

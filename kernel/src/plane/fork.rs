@@ -5,9 +5,10 @@ use crate::base::arena::plain_struct;
 use crate::base::index::Index;
 use crate::base::math::{cos, sin};
 use crate::plane::lobe::{PlaneLobe, Visible};
-use crate::plane::scene::{NOWHERE, RaySet};
-use crate::plane::trace::{Chains, Hit, Leg, Sink, graded_node, graded_sum, node, points};
-use crate::plane::view::{Scratch, Span};
+use crate::plane::nodes::{graded_node, graded_sum, node, points};
+use crate::plane::path::{Chains, Hit, PathState, Sink};
+use crate::plane::scene::{NOWHERE, PlaneScene, RaySet};
+use crate::plane::view::Span;
 use crate::plane::{Vec2, toward, turned};
 
 plain_struct! {
@@ -19,8 +20,8 @@ plain_struct! {
         pub normal: [f64; 2],
         /// Its middle, the mirror direction.
         pub direction: [f64; 2],
-        /// [`Leg::through`] and [`Leg::floor`] of what it reflects.
-        pub through: f64,
+        /// [`PathState::through`] and [`PathState::floor`] of what it reflects.
+        pub throughput: f64,
         /// See `through`.
         pub floor: f64,
         /// The visible part, W.
@@ -34,9 +35,9 @@ plain_struct! {
         pub primitive: u32,
         /// Its material.
         pub material: u32,
-        /// [`Leg::depth`] of its rays.
+        /// [`PathState::depth`] of its rays.
         pub depth: u32,
-        /// [`Leg::lobes`] of its rays.
+        /// [`PathState::lobes`] of its rays.
         pub lobes: u32,
         /// The next ray of the part, and how many it has.
         pub ray: u32,
@@ -67,21 +68,22 @@ const GRADED: u32 = 2;
 const PAPER: u32 = 3;
 
 impl Fork {
-    /// The lobe around `leg.direction` that is met at `hit`, `leg.lobes` counting it.
+    /// The lobe around `leg.direction` that is met at `hit`, `leg.lobes` counting it. `sweep` finds the spans that a split
+    /// lobe sees, and their number, where there is memory for them.
     pub(super) fn new(
-        chains: &Chains<'_>,
+        scene: &PlaneScene<'_>,
         hit: &Hit,
-        leg: &Leg,
+        leg: &PathState,
         material: u32,
-        scratch: &mut Scratch<'_>,
+        sweep: impl FnOnce() -> Option<usize>,
     ) -> Option<Fork> {
-        let (lobe, rays) = chains.scene.lobe(material)?;
+        let (lobe, rays) = scene.lobe(material)?;
         let visible = lobe.visible(leg.direction, hit.normal);
         let mut fork = Fork {
             point: hit.point.to_array(),
             normal: hit.normal.to_array(),
             direction: leg.direction.to_array(),
-            through: leg.through,
+            throughput: leg.throughput,
             floor: leg.floor,
             visible: [visible.low, visible.high],
             part: [visible.low, visible.high],
@@ -99,12 +101,10 @@ impl Fork {
             }
             RaySet::Gauss(counts) => fork.ask(NODES, fork.count(counts)),
             RaySet::Equal(counts) => (fork.kind, fork.rays) = (EVEN, fork.count(counts)),
-            RaySet::Split(counts) => {
-                match scratch.nested(chains.scene, hit.point, hit.normal, hit.primitive, chains.cuts) {
-                    Some(spans) => fork.spans = spans as u32,
-                    None => fork.ask(NODES, fork.count(counts)),
-                }
-            }
+            RaySet::Split(counts) => match sweep() {
+                Some(spans) => fork.spans = spans as u32,
+                None => fork.ask(NODES, fork.count(counts)),
+            },
         }
         Some(fork)
     }
@@ -127,13 +127,13 @@ impl Fork {
     /// A ray that carries the share `share` of the lobe's energy. At a path's first two lobes the chain's floor shrinks with
     /// the share: what the reflectances leave decides where it ends, not into how many rays a lobe is split. Beyond, small
     /// shares end, so that trees that branch at every lobe are finite.
-    fn leg(&self, direction: Vec2, share: f64) -> Leg {
+    fn leg(&self, direction: Vec2, share: f64) -> PathState {
         let floor = if self.lobes <= 2 { self.floor * share } else { self.floor };
-        Leg {
+        PathState {
             origin: Vec2::from(self.point),
             direction,
             skip: self.primitive,
-            through: self.through * share,
+            throughput: self.throughput * share,
             floor,
             depth: self.depth,
             lobes: self.lobes,
@@ -141,7 +141,12 @@ impl Fork {
     }
 
     /// The next ray to follow; rays toward the sky go to the sink. `spans` are those of the lobe's own sweep.
-    pub(super) fn next<S: Sink>(&mut self, chains: &Chains<'_>, spans: &[Span], sink: &mut S) -> Option<Leg> {
+    pub(super) fn next<S: Sink>(
+        &mut self,
+        chains: &Chains<'_>,
+        spans: &[Span],
+        sink: &mut S,
+    ) -> Option<PathState> {
         let lobe = chains.scene.lobe_alone(self.material)?;
         loop {
             if self.ray >= self.rays && !self.next_span(chains, lobe, spans) {

@@ -2,13 +2,14 @@
 
 use crate::base::arena::Memory;
 use crate::base::error::Error;
+use crate::plane::direct;
 use crate::plane::image::{self, Seen, Solved, View};
-use crate::plane::light::{self, Light};
+use crate::plane::light::Light;
 use crate::plane::rows::{self, RowInfo};
 use crate::plane::scene::{PlaneInput, PlaneScene};
+use crate::plane::scratch::Scratch;
 pub use crate::plane::settings::Settings;
 use crate::plane::solve::System;
-use crate::plane::view::Scratch;
 use std::vec;
 use std::vec::Vec;
 
@@ -57,7 +58,7 @@ pub fn solve<R>(
         let (mut open, mut direct) = (vec![0.0; unknowns * classes], vec![0.0; unknowns * classes]);
         let mut info = vec![RowInfo::default(); unknowns];
         rows::fill(&scene, &rows, 0..unknowns, &mut matrix, &mut open, &mut info, &mut scratch)?;
-        light::fill(&scene, light, &rows, 0..unknowns, &open, &mut direct, &mut scratch)?;
+        direct::fill(&scene, light, &rows, 0..unknowns, &open, &mut direct, &mut scratch)?;
         report.coupled = info.iter().map(|i| i.coupled as usize).sum();
         report.rays = info.iter().map(|i| u64::from(i.rays)).sum();
         report.tail = info.iter().map(|i| i.lost).fold(0.0, f64::max);

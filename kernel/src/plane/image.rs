@@ -6,9 +6,9 @@ use crate::base::math::{cos, sin};
 use crate::plane::Vec2;
 use crate::plane::light::Light;
 use crate::plane::lobe::PlaneLobe;
+use crate::plane::path::{Chains, Hit, PathState, Sink};
 use crate::plane::scene::{NOWHERE, PlaneScene};
-use crate::plane::trace::{Chains, Hit, Leg, Sink};
-use crate::plane::view::Scratch;
+use crate::plane::scratch::Scratch;
 use core::ops::Range;
 
 /// An orthographic view: samples at the centres of equal cells across the object's projected extent.
@@ -101,7 +101,7 @@ struct Eye<'a> {
 }
 
 impl Sink for Eye<'_> {
-    fn meet(&mut self, hit: &Hit, leg: &Leg) {
+    fn meet(&mut self, hit: &Hit, leg: &PathState) {
         self.seen.rays += 1;
         self.seen.object = true;
         let solved = self.solved;
@@ -121,7 +121,7 @@ impl Sink for Eye<'_> {
         let stencil = solved.scene.stencil(hit.primitive as usize, v);
         let smooth: f64 = stencil.terms().map(|(u, w)| w * values.get(u).copied().unwrap_or(0.0)).sum();
         let sun = diffuse * solved.light.sunlit(solved.scene, hit.point, hit.normal, hit.primitive);
-        self.seen.radiance += leg.through * (smooth + sun);
+        self.seen.radiance += leg.throughput * (smooth + sun);
     }
 
     fn back(&mut self) {
@@ -129,18 +129,18 @@ impl Sink for Eye<'_> {
         self.seen.object = true;
     }
 
-    fn escape(&mut self, leg: &Leg) {
+    fn escape(&mut self, leg: &PathState) {
         self.seen.rays += 1;
-        self.seen.radiance += leg.through * self.solved.light.radiance(leg.direction, leg.depth > 0);
+        self.seen.radiance += leg.throughput * self.solved.light.radiance(leg.direction, leg.depth > 0);
     }
 
-    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, leg: &Leg) {
+    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, leg: &PathState) {
         let solved = self.solved;
-        self.seen.radiance += leg.through * solved.light.in_lobe(solved.scene, hit, mirrored, lobe);
+        self.seen.radiance += leg.throughput * solved.light.in_lobe(solved.scene, hit, mirrored, lobe);
     }
 
-    fn lost(&mut self, through: f64) {
-        self.seen.lost += through;
+    fn lost(&mut self, throughput: f64) {
+        self.seen.lost += throughput;
     }
 }
 
@@ -155,7 +155,7 @@ impl Solved<'_> {
             cuts: self.light.cuts(),
         };
         let (skip, floor) = (NOWHERE, self.cutoff.max(1e-15));
-        let leg = Leg { origin, direction, skip, through: 1.0, floor, depth: 0, lobes: 0 };
+        let leg = PathState { origin, direction, skip, throughput: 1.0, floor, depth: 0, lobes: 0 };
         chains.follow(leg, &mut eye, scratch);
         eye.seen
     }

@@ -6,9 +6,11 @@ use crate::base::error::{Error, Field};
 use crate::base::index::{IndexMut, pieces, span};
 use crate::base::math::{clamp, floor, sqrt};
 use crate::plane::light::Light;
+use crate::plane::nodes::{graded, nodes};
+use crate::plane::path::{Chains, Hit, PathState, Sink};
 use crate::plane::scene::{PlaneScene, Primitive};
-use crate::plane::trace::{Chains, Hit, Leg, Sink, graded, nodes};
-use crate::plane::view::{Scratch, Span, distance, sweep};
+use crate::plane::scratch::{Scratch, sweep};
+use crate::plane::view::{Span, distance};
 use crate::plane::{Vec2, cross, length, toward};
 use core::ops::Range;
 
@@ -96,7 +98,7 @@ struct Row<'a> {
 }
 
 impl Sink for Row<'_> {
-    fn meet(&mut self, hit: &Hit, leg: &Leg) {
+    fn meet(&mut self, hit: &Hit, leg: &PathState) {
         let unknowns = self.scene.unknowns();
         self.info.rays += 1;
         self.info.coupled = 1;
@@ -105,19 +107,19 @@ impl Sink for Row<'_> {
         let v = self.scene.parameter(hit.primitive as usize, hit.point);
         for (unknown, weight) in self.scene.stencil(hit.primitive as usize, v).terms() {
             if let Some(entry) = part.get_mut(unknown) {
-                *entry += leg.through * weight;
+                *entry += leg.throughput * weight;
             }
         }
     }
 
-    fn escape(&mut self, leg: &Leg) {
+    fn escape(&mut self, leg: &PathState) {
         if let Some(open) = class(leg.depth, self.settings).and_then(|c| self.open.get_mut(c)) {
-            *open += leg.through;
+            *open += leg.throughput;
         }
     }
 
-    fn lost(&mut self, through: f64) {
-        self.info.lost += through;
+    fn lost(&mut self, throughput: f64) {
+        self.info.lost += throughput;
     }
 }
 
@@ -210,12 +212,12 @@ pub(crate) fn gather<S: Sink>(job: &Gather<'_>, unknown: usize, sink: &mut S, sc
 }
 
 impl Station<'_> {
-    fn leg(&self, s: f64, weight: f64) -> Leg {
-        Leg {
+    fn leg(&self, s: f64, weight: f64) -> PathState {
+        PathState {
             origin: self.point,
             direction: toward(self.normal, s),
             skip: self.skip,
-            through: weight,
+            throughput: weight,
             floor: weight * self.cutoff,
             depth: 0,
             lobes: 0,
@@ -361,7 +363,7 @@ impl Station<'_> {
         let sun = self.light.filter(|l| l.sun().is_some());
         let mut normal = self.normal;
         let faintest = sqrt(self.cutoff);
-        while leg.through > faintest && leg.depth <= self.chains.most.min(LONGEST_TOLD_APART) {
+        while leg.throughput > faintest && leg.depth <= self.chains.most.min(LONGEST_TOLD_APART) {
             let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip) else {
                 // chains that escape to either side of a trapped one
                 mix(u64::from(cross(normal, leg.direction) > 0.0));
@@ -380,8 +382,9 @@ impl Station<'_> {
             }
             normal = hit.normal;
             let mirrored = scene.mirrored(&hit, leg.direction);
-            let through = leg.through * scene.specular(p.material);
-            leg = Leg { origin: hit.point, direction: mirrored, skip: hit.primitive, through, ..leg };
+            let throughput = leg.throughput * scene.specular(p.material);
+            leg =
+                PathState { origin: hit.point, direction: mirrored, skip: hit.primitive, throughput, ..leg };
             leg.depth += 1;
         }
         hash

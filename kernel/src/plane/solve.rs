@@ -71,7 +71,7 @@ pub struct System<'a> {
 }
 
 impl<'a> System<'a> {
-    /// Joins all rows ([`crate::plane::rows::fill`]) and their light ([`crate::plane::light::fill`]).
+    /// Joins all rows ([`crate::plane::rows::fill`]) and their light ([`crate::plane::direct::fill`]).
     ///
     /// # Errors
     /// [`Error::Length`] where they do not fit the scene and one another.
