@@ -74,7 +74,7 @@ fn staged(case: &Case, plan: Plan) -> (Counts, Vec<u32>, Vec<u64>) {
     let counts = case
         .with_input(|input| stages::run(&mut work, input, sky.as_ref(), sun.as_ref(), &camera(), &plan))
         .unwrap();
-    (counts, work.pixel_bits(), work.table_bits(counts.unknowns, bands))
+    (counts, work.pixel_bits(), work.table_bits())
 }
 
 #[test]

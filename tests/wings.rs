@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The wings in the direction of the data. The plane model uses base, scene and radiosity, and nothing uses it.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 13] = [
     "base",
     "scene",
     "form_factor",
@@ -15,6 +15,7 @@ const ORDER: [&str; 12] = [
     "view",
     "settings",
     "rounds",
+    "stages",
     "bake",
     "host",
 ];

@@ -4,12 +4,11 @@ use crate::call;
 use crate::coupling::{Settings, blik_coupling};
 use crate::memory::*;
 use crate::scene::blik_scene;
-use crate::solution::{Tables, blik_solution};
+use crate::solution::blik_solution;
 use crate::status::*;
 use blik_kernel::arena::ALIGNMENT;
-use blik_kernel::bake::{self, Baked, Numbers};
+use blik_kernel::bake::{self, Baked};
 use blik_kernel::coupling::Block;
-use blik_kernel::policy;
 use blik_kernel::simd::Isa;
 use core::ffi::c_void;
 use core::ptr::null;
@@ -26,28 +25,13 @@ fn baked(
     if solution.is_some_and(|s| !core::ptr::eq(s.coupling, coupling)) {
         return Err(blik_error::of(BLIK_ERROR_HANDLE));
     }
-    let Settings { tolerance, max_bounces, all, directional, .. } = coupling.settings;
-    let solution = solution.map(|s| bake::Solution {
-        sky: s.input.0,
-        sun: s.input.1,
-        reference: s.tables.reference,
-        irradiance: s.tables.irradiance,
-        lit: s.tables.sun,
-        images: s.tables.images,
-        variance: s.tables.variance,
-        numbers: Numbers {
-            brightest: s.tables.brightest,
-            solver: s.tables.solver,
-            sweeps: u64::from(s.tables.sweeps),
-            sun_rays: s.tables.sun_rays,
-        },
-    });
+    let solution = solution.map(|s| bake::Solution { sky: s.input.0, sun: s.input.1, record: s.record });
     Ok(Baked {
         scene: coupling.base.scene,
         bvh: coupling.base.bvh,
         elements: coupling.elements,
         blocks: coupling.blocks,
-        settings: bake::Settings { tolerance, max_bounces, all, directional },
+        settings: coupling.settings.asked,
         solution,
     })
 }
@@ -193,8 +177,7 @@ pub unsafe extern "C" fn blik_load(
             Some(solution) => Some((*solution, solution.light(baked.scene.bands())?)),
             None => None,
         };
-        let bake::Settings { tolerance, max_bounces, all, directional } = baked.settings;
-        let settings = Settings::baked(tolerance, max_bounces, all, directional);
+        let settings = Settings { asked: baked.settings, fit: false };
         // SAFETY: `place` made room for each; the handles live as long as the caller's memory.
         unsafe {
             scene_at.write(blik_scene::new(baked.scene, baked.bvh));
@@ -203,23 +186,8 @@ pub unsafe extern "C" fn blik_load(
             let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
             let mut solved = null();
             if let Some((own, light)) = lit {
-                let tables = Tables {
-                    reference: own.reference,
-                    irradiance: own.irradiance,
-                    sun: own.lit,
-                    images: own.images,
-                    variance: own.variance,
-                    brightest: own.numbers.brightest,
-                    solver: own.numbers.solver,
-                    sweeps: own.numbers.sweeps as u32,
-                    sun_rays: own.numbers.sun_rays,
-                    bytes: size_of_val(own.irradiance)
-                        + size_of_val(own.lit)
-                        + size_of_val(own.variance)
-                        + own.images.memory(),
-                };
-                let shape = policy::shape(max_bounces, base.scene.bands());
-                solution_at.write(blik_solution::new(coupled, light, (own.sky, own.sun), tables, shape));
+                let (record, input) = (own.record, (own.sky, own.sun));
+                solution_at.write(blik_solution::new(coupled, light, input, record, record.memory()));
                 solved = solution_at.as_ptr().cast_const();
             }
             to_scene.write(scene_at.as_ptr());

@@ -12,8 +12,9 @@ use blik_kernel::coupling::rows::{RowSettings, fill};
 use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN, sink};
 use blik_kernel::element::Elements;
 use blik_kernel::facing::Facing;
+use blik_kernel::stages::{Executor, block_rows as piece};
 use blik_kernel::subdivide::{self, Cut};
-use blik_kernel::{Error, policy};
+use blik_kernel::{Error, settings};
 use core::ffi::c_void;
 use core::ops::Range;
 
@@ -49,16 +50,9 @@ impl Handle for blik_coupling {
 /// Checked [`blik_settings`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    pub tolerance: f64,
-    /// That of images.
-    pub image: f64,
-    pub max_bounces: Option<u32>,
-    pub all: bool,
-    pub directional: bool,
+    pub asked: settings::Settings,
     /// Fewer rays rather than no room.
-    fit: bool,
-    /// Most first rays of all rows.
-    budget: Option<u64>,
+    pub fit: bool,
 }
 
 impl Settings {
@@ -66,41 +60,24 @@ impl Settings {
     /// As for [`read`].
     unsafe fn new(settings: *const blik_settings) -> Result<Settings, blik_error> {
         // SAFETY: by the caller's promise.
-        let settings = unsafe { read(settings) }?;
-        policy::check_tolerance(settings.tolerance)?;
-        let image = match settings.image_tolerance {
-            0.0 => settings.tolerance,
-            given => given,
+        let given = unsafe { read(settings) }?;
+        let image = Some(given.image_tolerance).filter(|image| *image != 0.0);
+        let asked = settings::Settings {
+            max_bounces: u32::try_from(given.max_bounces).ok(),
+            all_irradiances: given.all_irradiances != 0,
+            directional: given.directional != 0,
+            ray_budget: Some(given.ray_budget).filter(|&rays| rays > 0),
+            ..settings::Settings::new(given.tolerance, image)?
         };
-        policy::check_tolerance(image)?;
-        Ok(Settings {
-            tolerance: settings.tolerance,
-            image: image.min(settings.tolerance),
-            max_bounces: u32::try_from(settings.max_bounces).ok(),
-            all: settings.all_irradiances != 0,
-            directional: settings.directional != 0,
-            fit: settings.fit_memory != 0,
-            budget: Some(settings.ray_budget).filter(|&rays| rays > 0),
-        })
+        Ok(Settings { asked, fit: given.fit_memory != 0 })
     }
 
     fn rows(&self, base: &blik_scene) -> RowSettings {
-        RowSettings::new(&base.scene, self.tolerance, self.max_bounces, self.directional, self.all)
+        self.asked.rows(&base.scene)
     }
 
     fn planes(&self, base: &blik_scene) -> bool {
-        policy::planes(&base.scene, &self.rows(base))
-    }
-
-    /// Those of a baked coupling.
-    pub(crate) fn baked(tolerance: f64, max_bounces: Option<u32>, all: bool, directional: bool) -> Settings {
-        Settings { tolerance, image: tolerance, max_bounces, all, directional, fit: false, budget: None }
-    }
-
-    /// The same for so many rows, within the budget.
-    fn rows_within(&self, base: &blik_scene, count: usize) -> RowSettings {
-        let rows = self.rows(base);
-        self.budget.map_or(rows, |budget| rows.within(count, budget))
+        settings::planes(&base.scene, &self.rows(base))
     }
 }
 
@@ -209,9 +186,9 @@ fn cut<'s>(
     runner: &mut Runner,
     scratch: &'s mut [u8],
 ) -> Result<Cut<'s>, blik_error> {
-    let tolerance = settings.tolerance;
+    let tolerance = settings.asked.tolerance;
     let mut cut = Cut::new(&base.scene, tolerance, scratch)?;
-    let probing = policy::probing(&settings.rows(base));
+    let probing = settings::probing(&settings.rows(base));
     loop {
         let (work, unevenness) = cut.work();
         runner.rows(unevenness, 1, PROBING, |range, out| {
@@ -223,12 +200,6 @@ fn cut<'s>(
     }
 }
 
-/// Rows of one piece of work: as many pieces as balance two dozen threads, large enough that a block's head does not
-/// count.
-fn piece(rows: usize) -> usize {
-    rows.div_ceil(256).clamp(16, 1024)
-}
-
 /// Makes the elements in the caller's memory.
 fn elements(
     base: &blik_scene,
@@ -238,7 +209,7 @@ fn elements(
     cutter: &mut Cutter,
 ) -> Result<Elements<'static>, blik_error> {
     // the trees stand at the end of the memory while the elements are made at its front
-    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.tolerance)?;
+    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.asked.tolerance)?;
     let whole = cutter.lend();
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
@@ -286,7 +257,7 @@ impl Filler<'_> {
         note: &(dyn Fn(Spot) -> bool + Sync),
     ) -> Result<(), Error> {
         let bands = self.base.scene.bands();
-        let unmerged = policy::unmerged(self.rows);
+        let unmerged = settings::unmerged(self.rows);
         let (mut next, mut at, mut records) = (range.start, region.start, 64);
         while next < range.end {
             let until = (next + piece(self.elements.unknowns())).min(range.end);
@@ -401,7 +372,7 @@ impl Filler<'_> {
         let all = self.elements.unknowns();
         let done: usize = self.spots.iter().take(self.used).map(|s| s.rows).sum();
         let per_row = self.end.checked_div(done).unwrap_or(0);
-        let fixed = sink::bytes(1, 64, policy::unmerged(self.rows), self.base.scene.bands()).unwrap_or(0);
+        let fixed = sink::bytes(1, 64, settings::unmerged(self.rows), self.base.scene.bands()).unwrap_or(0);
         let needed = per_row.saturating_mul(all).saturating_add(per_row * (all - done) / 4);
         let needed = needed.saturating_add(2 * fixed).max(self.size + fixed);
         blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, self.size)
@@ -432,11 +403,12 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     while let Some(fewer) = rows.fewer().filter(|_| settings.fit) {
         rows = fewer;
     }
-    let unknowns = subdivide::most_elements(base.scene.facets(), settings.tolerance) * base.scene.sides();
-    let row = sink::bytes(piece(unknowns), 64, policy::unmerged(&rows), base.scene.bands())?;
+    let unknowns =
+        subdivide::most_elements(base.scene.facets(), settings.asked.tolerance) * base.scene.sides();
+    let row = sink::bytes(piece(unknowns), 64, settings::unmerged(&rows), base.scene.bands())?;
     let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
     let planes = Facing::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
-    let parts = [head::<blik_coupling>(), element_bytes(base, settings.tolerance)?, table, row, planes];
+    let parts = [head::<blik_coupling>(), element_bytes(base, settings.asked.tolerance)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
 
@@ -470,7 +442,7 @@ fn build(
     let planes = cutter.take_back(Facing::bytes(&base.scene, settings.planes(base))?)?;
     let facing = Facing::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
     let elements = elements(base, &facing, settings, runner, &mut cutter)?;
-    let mut rows = settings.rows_within(base, elements.unknowns());
+    let mut rows = settings.asked.rows_within(&base.scene, elements.unknowns());
     let most = most_blocks(elements.unknowns());
     let spots = table(&mut cutter, most, Spot::default())?;
     let room = (most * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
@@ -658,13 +630,13 @@ mod owned {
         // SAFETY: dropped at the end of this function, after the last use.
         let facing =
             Facing::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
-        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.tolerance)?)?;
+        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.asked.tolerance)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
         let cut = cut(base, &facing, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(&cut)?)?;
         // SAFETY: the handle owns the slab.
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
-        let rows = settings.rows_within(base, elements.unknowns());
+        let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
         let (unknowns, piece) = (elements.unknowns(), piece(elements.unknowns()));
         let done = Mutex::new(Vec::new());
         runner.each(unknowns.div_ceil(piece), runner.lanes(), 1.0 - PROBING, &|_, item| {
@@ -703,7 +675,7 @@ mod owned {
         range: Range<usize>,
     ) -> Result<Vec<Slab>, blik_error> {
         let mut slabs = Vec::new();
-        let (mut next, mut records, mut unmerged) = (range.start, 64, policy::unmerged(rows));
+        let (mut next, mut records, mut unmerged) = (range.start, 64, settings::unmerged(rows));
         while next < range.end {
             let bytes = sink::bytes(range.end - next, records, unmerged, base.scene.bands())?;
             let mut slab = Slab::new(bytes)?;

@@ -1,12 +1,12 @@
 //! How good a result is, and what was done for it.
 
 use crate::call;
-use crate::coupling::Settings;
 use crate::memory::{needed, object};
 use crate::solution::blik_solution;
 use crate::status::*;
 use crate::view::blik_tally;
 use blik_kernel::policy::{self, Limit, Round};
+use blik_kernel::settings::Settings as Asked;
 
 /// `limited_by` of [`blik_report`]: the estimate is 0.
 pub const BLIK_LIMIT_NOTHING: i32 = 0;
@@ -81,26 +81,26 @@ pub unsafe extern "C" fn blik_get_report(
             }
         }
         let coupling = solution.coupling.info()?;
-        let (base, tables) = (solution.coupling.base, &solution.tables);
-        let Settings { tolerance, image, .. } = solution.coupling.settings;
-        let (estimate, limit) = policy::estimate(&tally.kernel(), tables.solver);
+        let (base, numbers) = (solution.coupling.base, &solution.record.numbers);
+        let Asked { tolerance, image_tolerance, .. } = solution.coupling.settings.asked;
+        let (estimate, limit) = policy::estimate(&tally.kernel(), numbers.solver);
         let report = blik_report {
             tolerance,
             error_estimate: estimate,
-            certified_solver: tables.solver,
+            certified_solver: numbers.solver,
             certified_chain_tail: tally.chain_tail,
             certified_dropped: coupling.dropped,
             visibility_rays: coupling.rays,
-            sun_rays: tables.sun_rays,
+            sun_rays: numbers.sun_rays,
             primary_rays: tally.primary_rays,
             chain_rays: tally.chain_rays,
             pairs: coupling.pairs,
             skipped_rows: coupling.skipped_rows,
             open_rows: coupling.open_rows,
             elements: coupling.elements,
-            bytes: base.scene.memory() + base.bvh.memory() + coupling.bytes + tables.bytes,
-            sweeps: tables.sweeps,
-            tolerance_met: i32::from(estimate <= image),
+            bytes: base.scene.memory() + base.bvh.memory() + coupling.bytes + solution.bytes,
+            sweeps: numbers.sweeps as u32,
+            tolerance_met: i32::from(estimate <= image_tolerance),
             limited_by: match limit {
                 Limit::Nothing => BLIK_LIMIT_NOTHING,
                 Limit::Visibility => BLIK_LIMIT_VISIBILITY,

@@ -3,9 +3,9 @@
 use crate::status::*;
 use crate::types::{Sized_, read, sized};
 use blik_kernel::Error;
+use blik_kernel::stages::{Executor, Merge};
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
-use core::ops::Range;
 use core::ptr::null_mut;
 use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -172,47 +172,39 @@ impl Runner {
         }
     }
 
-    /// Splits `out` (`stride` values a row) into pieces and calls `work` with each range of rows and its part.
-    pub fn rows<T: Send>(
-        &mut self,
-        out: &mut [T],
-        stride: usize,
-        share: f64,
-        work: impl Fn(Range<usize>, &mut [T]) -> Result<(), Error> + Sync,
-    ) -> Result<(), blik_error> {
-        let stride = stride.max(1);
-        let rows = out.len() / stride;
-        let lanes = self.lanes();
-        let piece = rows.div_ceil((16 * lanes).max(1)).clamp(16, 4096);
-        let start = Start(out.as_mut_ptr());
-        self.each(rows.div_ceil(piece), lanes, share, &|_, item| {
-            let range = item * piece..((item + 1) * piece).min(rows);
-            // SAFETY: `each` hands out every item once, so that the parts are disjoint; they lie within `out`.
-            let part = unsafe {
-                core::slice::from_raw_parts_mut(start.at(range.start * stride), range.len() * stride)
-            };
-            Ok(work(range, part)?)
-        })
-    }
-
-    /// Calls `work` with ranges that cover all `rows`.
-    pub fn ranges(
-        &mut self,
-        rows: usize,
-        share: f64,
-        work: impl Fn(Range<usize>) -> Result<(), Error> + Sync,
-    ) -> Result<(), blik_error> {
-        let lanes = self.lanes();
-        let piece = rows.div_ceil((16 * lanes).max(1)).clamp(16, 4096);
-        self.each(rows.div_ceil(piece), lanes, share, &|_, item| {
-            Ok(work(item * piece..((item + 1) * piece).min(rows))?)
-        })
-    }
-
     fn told(&self, done: f64) -> bool {
         let Some(progress) = self.run.progress else { return true };
         // SAFETY: the caller's function, with the caller's pointer.
         (unsafe { progress(self.run.progress_user, done) }) == 0
+    }
+}
+
+impl Executor for Runner {
+    type Error = blik_error;
+
+    fn lanes(&self) -> usize {
+        Runner::lanes(self)
+    }
+
+    fn pieces<T: Send, R: Merge>(
+        &mut self,
+        out: &mut [T],
+        piece: usize,
+        share: f64,
+        work: impl Fn(usize, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<R, blik_error> {
+        let (piece, all) = (piece.max(1), out.len());
+        let start = Start(out.as_mut_ptr());
+        let merged = Turns::new(R::default());
+        self.each(all.div_ceil(piece), Runner::lanes(self), share, &|_, item| {
+            let first = item * piece;
+            // SAFETY: `each` hands out every item once, so that the parts are disjoint; they lie within `out`.
+            let part = unsafe { core::slice::from_raw_parts_mut(start.at(first), piece.min(all - first)) };
+            let one = work(item, part)?;
+            merged.with(|all| all.merge(one));
+            Ok(())
+        })?;
+        Ok(merged.into_inner())
     }
 }
 

@@ -13,6 +13,7 @@ use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::{Mesh, Scene};
 use blik_kernel::simd::Isa;
+use blik_kernel::stages::Executor;
 use core::ffi::c_void;
 
 /// A scene in memory. Read-only once made: any number of threads may use it at once.

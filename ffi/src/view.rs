@@ -130,7 +130,7 @@ pub unsafe extern "C" fn blik_image_scratch_size(
         let (solution, runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         // SAFETY: by the caller's promise.
         let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
-        let (fixed, lane) = scratch_parts(&camera, solution.shape.bands)?;
+        let (fixed, lane) = scratch_parts(&camera, solution.record.shape.bands)?;
         // SAFETY: not null.
         unsafe { to.write(fixed + lane * runner.lanes()) };
         Ok(())
@@ -221,7 +221,7 @@ pub unsafe extern "C" fn blik_image(
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         // SAFETY: by the caller's promise.
         let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
-        let bands = solution.shape.bands;
+        let bands = solution.record.shape.bands;
         // SAFETY: by the caller's promise.
         let mut out =
             unsafe { Out::new(pixels, count, components, camera.rows() * camera.columns() * bands) }?;
@@ -246,7 +246,7 @@ fn paint(
     scratch: &mut [u8],
     runner: &mut Runner,
 ) -> Result<Tally, blik_error> {
-    let (rows, bands) = (camera.rows(), solution.shape.bands);
+    let (rows, bands) = (camera.rows(), solution.record.shape.bands);
     let (fixed, lane_size) = scratch_parts(camera, bands)?;
     let lanes = scratch.len().saturating_sub(fixed) / lane_size.max(1);
     if lanes == 0 {
@@ -315,7 +315,7 @@ pub unsafe extern "C" fn blik_image_rows(
         let solution: &blik_solution = unsafe { object(solution) }?;
         // SAFETY: by the caller's promise.
         let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
-        let bands = solution.shape.bands;
+        let bands = solution.record.shape.bands;
         let range = rows_of(first, rows, camera.rows())?;
         let expected = rows * camera.columns() * bands;
         // SAFETY: by the caller's promise.
@@ -413,7 +413,7 @@ pub unsafe extern "C" fn blik_radiance(
     call(error, || {
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
-        let bands = solution.shape.bands;
+        let bands = solution.record.shape.bands;
         let all = count.checked_mul(bands).ok_or(blik_error::of(BLIK_ERROR_TOO_MANY))?;
         // SAFETY: by the caller's promise.
         let (rays, out) = unsafe { (input(rays, count)?, output(radiance, all)?) };
@@ -492,14 +492,17 @@ pub unsafe extern "C" fn blik_signatures(
     call(error, || {
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
-        let bands = solution.shape.bands;
+        let bands = solution.record.shape.bands;
         let too_many = blik_error::of(BLIK_ERROR_TOO_MANY);
         let (all, numbers) =
             (views.checked_mul(bands).ok_or(too_many)?, views.checked_mul(3).ok_or(too_many)?);
         // SAFETY: by the caller's promise.
         let (directions, out) = unsafe { (input(directions, numbers)?, output(signatures, all)?) };
-        let cells =
-            if cells == 0 { policy::signature_cells(solution.coupling.settings.tolerance) } else { cells };
+        let cells = if cells == 0 {
+            policy::signature_cells(solution.coupling.settings.asked.tolerance)
+        } else {
+            cells
+        };
         if cells > MOST_CELLS {
             return Err(too_many.sizes(MOST_CELLS, cells));
         }
@@ -568,7 +571,7 @@ pub unsafe extern "C" fn blik_facets(
         let solution: &blik_solution = unsafe { object(solution) }?;
         let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
         let coupling = solution.coupling.matrix()?;
-        let (bands, sides) = (solution.shape.bands, scene.sides());
+        let (bands, sides) = (solution.record.shape.bands, scene.sides());
         let range = rows_of(first, count, scene.facets())?;
         let of = |at: *mut f64, size: usize| if at.is_null() { 0 } else { size };
         let size = count * sides * bands;
@@ -587,7 +590,7 @@ pub unsafe extern "C" fn blik_facets(
         let [e, l] = values.each_mut().map(|all| all.split_at_mut(bands.min(MAX_BANDS)).0);
         for (at, facet) in range.enumerate() {
             for side in 0..sides {
-                facets::side(&solved, &coupling, solution.tables.sun, facet, side, e, l);
+                facets::side(&solved, &coupling, solution.record.sun, facet, side, e, l);
                 let start = (at * sides + side) * bands;
                 irradiance.iter_mut().skip(start).zip(&*e).for_each(|(to, from)| *to = *from);
                 radiance.iter_mut().skip(start).zip(&*l).for_each(|(to, from)| *to = *from);

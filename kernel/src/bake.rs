@@ -16,13 +16,14 @@ use crate::base::simd::Isa;
 use crate::coupling::Block;
 use crate::coupling::element::Elements;
 use crate::radiosity::direct::Shape;
+use crate::radiosity::solution::{self, Numbers};
 use crate::radiosity::sun_image::{self, SunImages};
 use crate::rays::bvh::Bvh;
 use crate::scene::light;
 use crate::scene::sky::{Sky, SkyInput, SkyModel, SkyTable};
 use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{MAX_BANDS, Scene};
-use crate::settings;
+use crate::settings::{self, Settings};
 
 /// Version of the layout; another one is refused.
 pub const VERSION: u64 = 3;
@@ -57,52 +58,15 @@ plain_struct! {
     }
 }
 
-/// What decided the coupling besides the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// The wanted error.
-    pub tolerance: f64,
-    /// Light reflected more often does not count; `None`: by tolerance.
-    pub max_bounces: Option<u32>,
-    /// Irradiance of all facets is wanted.
-    pub all: bool,
-    /// Directions of blocked and mirrored light are kept.
-    pub directional: bool,
-}
-
-/// Light and what it gave.
+/// Light and its solution.
 #[derive(Clone, Copy, Debug)]
 pub struct Solution<'m> {
     /// The sky.
     pub sky: Option<SkyInput<'m>>,
     /// The sun.
     pub sun: Option<SunInput<'m>>,
-    /// Reference radiance of each band.
-    pub reference: &'m [f64],
-    /// Mean and gradients of each unknown's irradiance without the sun's direct part and that of its images.
-    pub irradiance: &'m [f64],
-    /// Mean of cos V of the sun of each unknown.
-    pub lit: &'m [f64],
-    /// Images of the sun in flat mirrors.
-    pub images: SunImages<'m>,
-    /// Expected squared error of each unknown.
-    pub variance: &'m [f32],
-    /// Numbers.
-    pub numbers: Numbers,
-}
-
-plain_struct! {
-    /// Numbers of a solution.
-    pub struct Numbers {
-        /// Largest radiance that any ray can see, relative to the reference.
-        pub brightest: f64,
-        /// Bound on the radiances' error.
-        pub solver: f64,
-        /// Sweeps done.
-        pub sweeps: u64,
-        /// Rays toward the sun.
-        pub sun_rays: u64,
-    }
+    /// The solved scene.
+    pub record: solution::Solution<'m>,
 }
 
 plain_struct! {
@@ -184,7 +148,7 @@ impl<'m> Baked<'m> {
             checksum: 0,
             tolerance: self.settings.tolerance,
             max_bounces: self.settings.max_bounces.map_or(u64::MAX, u64::from),
-            flags: u64::from(self.settings.all) | u64::from(self.settings.directional) << 1,
+            flags: u64::from(self.settings.all_irradiances) | u64::from(self.settings.directional) << 1,
             blocks: self.blocks.len() as u64,
             solved: u64::from(self.solution.is_some()),
         };
@@ -241,16 +205,15 @@ impl<'m> Baked<'m> {
         isa: Isa,
         blocks: &'m mut [Block<'m>],
     ) -> Result<Baked<'m>, Error> {
-        settings::check_tolerance(head.tolerance)?;
         let max_bounces = match head.max_bounces {
             u64::MAX => None,
             most => Some(u32::try_from(most).map_err(|_| Error::Block)?),
         };
         let settings = Settings {
-            tolerance: head.tolerance,
             max_bounces,
-            all: head.flags & 1 != 0,
+            all_irradiances: head.flags & 1 != 0,
             directional: head.flags & 2 != 0,
+            ..Settings::new(head.tolerance, None)?
         };
         let mut view = View::new(memory);
         view.take::<Head>(1)?;
@@ -315,19 +278,20 @@ impl<'m> Solution<'m> {
         if let Some(sun) = &self.sun {
             (head.sun, head.sun_direction, head.half_angle_deg) = (1, sun.direction, sun.half_angle_deg);
         }
-        head.images = u64::from(!self.images.slots.is_empty());
+        let solution::Solution { reference, irradiance, sun, images, variance, numbers, .. } = self.record;
+        head.images = u64::from(!images.slots.is_empty());
         writer.put(&[head])?;
         put_bands(writer, radiance, bands)?;
         put_bands(writer, ground, bands)?;
         put_bands(writer, self.sun.map_or(&[], |s| s.irradiance), bands)?;
         writer.put(samples)?;
-        writer.put(&[self.numbers])?;
-        writer.put(self.reference)?;
-        writer.put(self.irradiance)?;
-        writer.put(self.lit)?;
-        writer.put(self.variance)?;
-        writer.put(self.images.slots)?;
-        writer.put(self.images.thrown)
+        writer.put(&[numbers])?;
+        writer.put(reference)?;
+        writer.put(irradiance)?;
+        writer.put(sun)?;
+        writer.put(variance)?;
+        writer.put(images.slots)?;
+        writer.put(images.thrown)
     }
 
     fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: Shape) -> Result<Solution<'m>, Error> {
@@ -378,22 +342,24 @@ impl<'m> Solution<'m> {
             let thrown = view.take::<f64>(unknowns * shape.levels * bands)?;
             images = SunImages::new(slots, thrown, sides, unknowns, shape)?;
         }
-        let solution = Solution { sky, sun, reference, irradiance, lit, images, variance, numbers };
+        let record = solution::Solution { shape, reference, irradiance, sun: lit, images, variance, numbers };
+        let solution = Solution { sky, sun, record };
         solution.check()?;
         Ok(solution)
     }
 
     /// Values within what the kernel makes.
     fn check(&self) -> Result<(), Error> {
+        let record = &self.record;
         let positive = |x: &f64| (0.0..=1e300).contains(x);
         // irradiance: pi times the largest radiance, gradients some times that
-        let right = self.irradiance.iter().all(|x| x.abs() <= 1e40)
-            && self.lit.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
-            && self.images.thrown.iter().all(|x| (0.0..=1e40).contains(x))
-            && self.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))
-            && self.reference.iter().all(|x| (0.0..=1e38).contains(x))
-            && positive(&self.numbers.brightest)
-            && self.numbers.solver >= 0.0;
+        let right = record.irradiance.iter().all(|x| x.abs() <= 1e40)
+            && record.sun.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
+            && record.images.thrown.iter().all(|x| (0.0..=1e40).contains(x))
+            && record.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))
+            && record.reference.iter().all(|x| (0.0..=1e38).contains(x))
+            && positive(&record.numbers.brightest)
+            && record.numbers.solver >= 0.0;
         if right { Ok(()) } else { Err(Error::Block) }
     }
 

@@ -6,33 +6,31 @@
 
 mod report;
 mod rounds;
+mod run;
 
 pub use report::*;
 pub use rounds::Rounds;
+use run::Run;
 
-use crate::base::arena::Memory;
+use crate::base::arena::{Arena, Memory};
 use crate::base::error::Error;
-use crate::base::index::IndexMut;
 use crate::base::math::Vec3;
 use crate::base::simd::Isa;
 use crate::coupling::element::Elements;
 use crate::coupling::facing::Facing;
-use crate::coupling::rows::{RowSettings, fill};
+use crate::coupling::rows::fill;
 use crate::coupling::subdivide::Cut;
 use crate::coupling::{Block, Coupling, sink};
-use crate::radiosity::System;
-use crate::radiosity::accuracy;
-use crate::radiosity::beam;
-use crate::radiosity::direct::{self, Shape};
-use crate::radiosity::limits;
-use crate::radiosity::solver::{self, History, Solver};
-use crate::radiosity::sun_image::{self, Noting, SunImages};
+use crate::radiosity::direct::Shape;
+use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize};
+use crate::radiosity::sun_image::SunImages;
 use crate::rays::bvh::Bvh;
 use crate::scene::light::{self, Light};
 use crate::scene::sky::{Sky, SkyInput};
 use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{Scene, SceneInput};
 use crate::settings;
+use crate::stages::{Beams, Executor, Lighting, Sizes, block_rows};
 use crate::view::camera::{Camera, CameraInput};
 use crate::view::chain::Solved;
 use crate::view::facets;
@@ -62,6 +60,9 @@ pub struct Settings {
     /// Keep the directions of blocked and mirrored light, so that a new sky needs no rays. Where it is false,
     /// only uniform skies can light the scene, and what nothing hides is entered in closed form, sooner and more exactly.
     pub directional: bool,
+    /// The most first rays of all rows of the coupling; `None`: by tolerance. Fewer leave a larger error, which the estimate
+    /// tells.
+    pub ray_budget: Option<u64>,
 }
 
 impl Default for Settings {
@@ -73,16 +74,22 @@ impl Default for Settings {
             reference_radiance: None,
             all_irradiances: false,
             directional: true,
+            ray_budget: None,
         }
     }
 }
 
 impl Settings {
-    /// The wanted error of images.
-    fn of_image(&self) -> f64 {
-        self.image_tolerance.map_or(self.tolerance, |image| image.min(self.tolerance))
+    /// What the stages take.
+    fn checked(&self) -> Result<settings::Settings, Error> {
+        let Settings { max_bounces, all_irradiances, directional, ray_budget, .. } = *self;
+        let tolerances = settings::Settings::new(self.tolerance, self.image_tolerance)?;
+        Ok(settings::Settings { max_bounces, all_irradiances, directional, ray_budget, ..tolerances })
     }
 }
+
+/// The most bytes of a lane's beams: a facet's rays, all of which meet other elements, need less by far.
+const MOST_BEAM_BYTES: usize = 1 << 34;
 
 /// Threads on which all stages run.
 #[derive(Debug)]
@@ -107,7 +114,9 @@ pub struct Geometry<'s> {
     bvh: Bvh<'s>,
     elements: Elements<'s>,
     blocks: Vec<Block<'s>>,
-    settings: Settings,
+    settings: settings::Settings,
+    /// The caller's reference radiance.
+    reference: Option<Vec<f64>>,
     /// Rays of the coupling.
     rays: u64,
     report: Report,
@@ -119,36 +128,43 @@ pub struct Lit<'g> {
     geometry: &'g Geometry<'g>,
     light: Light<'g>,
     shape: Shape,
-    reference: Vec<f64>,
-    irradiance: Vec<f64>,
-    sun: Vec<f64>,
-    suns: Suns,
-    variance: Vec<f32>,
-    brightest: f64,
+    tables: Tables,
+    numbers: Numbers,
     report: Report,
 }
 
-/// The system while it is solved.
-#[derive(Debug, Default)]
-struct Solving {
-    /// The solution.
-    radiance: Vec<f64>,
-    next: Vec<f64>,
-    history: Vec<f64>,
-    /// As [`Host::bounds`] gives them, once they are known.
-    bounds: Option<(f64, Option<f64>)>,
-}
-
-/// What mirrors throw of the sun.
-#[derive(Debug, Default)]
-struct Suns {
+/// Memory of a solution.
+#[derive(Debug)]
+struct Tables {
+    reference: Vec<f64>,
+    irradiance: Vec<f64>,
+    sun: Vec<f64>,
     slots: Vec<u64>,
     thrown: Vec<f64>,
+    variance: Vec<f32>,
 }
 
-impl Suns {
-    fn images(&self) -> SunImages<'_> {
-        SunImages { slots: &self.slots, thrown: &self.thrown }
+impl Tables {
+    fn new(size: &SolutionSize) -> Tables {
+        Tables {
+            reference: std::vec![0.0; size.shape.bands],
+            irradiance: std::vec![0.0; size.table()],
+            sun: std::vec![0.0; size.unknowns],
+            slots: std::vec![0; size.places],
+            thrown: std::vec![0.0; size.thrown()],
+            variance: std::vec![0.0; size.unknowns],
+        }
+    }
+
+    fn memory(&mut self) -> SolutionMemory<'_> {
+        SolutionMemory {
+            reference: &mut self.reference,
+            irradiance: &mut self.irradiance,
+            sun: &mut self.sun,
+            slots: &mut self.slots,
+            thrown: &mut self.thrown,
+            variance: &mut self.variance,
+        }
     }
 }
 
@@ -187,14 +203,13 @@ impl Host {
         input: &SceneInput<'_>,
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
-        settings::check_tolerance(settings.tolerance)?;
-        if let Some(image) = settings.image_tolerance {
-            settings::check_tolerance(image)?;
-        }
-        if let Some(reference) = &settings.reference_radiance {
+        let reference = settings.reference_radiance.clone();
+        let settings = settings.checked()?;
+        if let Some(reference) = &reference {
             light::check_reference(reference, input.bands)?;
         }
-        let mut report = Report { tolerance: settings.of_image(), bands: input.bands, ..Report::default() };
+        let mut report =
+            Report { tolerance: settings.image_tolerance, bands: input.bands, ..Report::default() };
         let mut clock = Clock::start();
         let GeometryMemory { scene: scene_memory, bvh: bvh_memory, elements: element_memory, slabs } = memory;
         *scene_memory = Memory::new(Scene::bytes(input)?);
@@ -207,13 +222,7 @@ impl Host {
         let bvh = Bvh::build(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
         report.bytes.bvh = bvh.memory();
         report.seconds.bvh = clock.lap();
-        let rows = RowSettings::new(
-            &scene,
-            settings.tolerance,
-            settings.max_bounces,
-            settings.directional,
-            settings.all_irradiances,
-        );
+        let rows = settings.rows(&scene);
         let wanted = settings::planes(&scene, &rows);
         let mut planes = Memory::new(Facing::bytes(&scene, wanted)?);
         let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
@@ -233,6 +242,7 @@ impl Host {
         *element_memory = Memory::new(Elements::bytes(&cut)?);
         let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
+        let rows = settings.rows_within(&scene, elements.unknowns());
         let unmerged = settings::unmerged(&rows);
         *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
             fill(&scene, &bvh, &elements, &facing, &rows, range, memory)
@@ -245,7 +255,7 @@ impl Host {
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
-        Ok(Geometry { scene, bvh, elements, blocks, settings: settings.clone(), rays, report })
+        Ok(Geometry { scene, bvh, elements, blocks, settings, reference, rays, report })
     }
 
     /// Fills blocks with all `rows` rows, each of some `unmerged` records while it grows, in parallel.
@@ -256,8 +266,7 @@ impl Host {
         bands: usize,
         fill: impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error> + Sync,
     ) -> Result<Vec<Memory>, Error> {
-        // enough pieces to balance two dozen threads, large enough that a block's head does not count
-        let piece = rows.div_ceil(256).clamp(16, 1024);
+        let piece = block_rows(rows);
         let pieces: Vec<Range<usize>> =
             (0..rows).step_by(piece).map(|start| start..(start + piece).min(rows)).collect();
         let filled = self.pool.install(|| {
@@ -290,7 +299,7 @@ impl Host {
         sky: Option<&SkyInput<'g>>,
         sun: Option<&SunInput<'g>>,
     ) -> Result<Lit<'g>, Error> {
-        let (scene, elements) = (&geometry.scene, &geometry.elements);
+        let Geometry { scene, bvh, elements, settings, .. } = geometry;
         let bands = scene.bands();
         let mut report = geometry.report.clone();
         let mut clock = Clock::start();
@@ -298,243 +307,36 @@ impl Host {
             sky: sky.map(|s| Sky::new(s, bands)).transpose()?,
             sun: sun.map(|s| Sun::new(s, bands)).transpose()?,
         };
-        limits::check_highlights(scene, &light)?;
-        let mut reference = std::vec![0.0; bands];
-        match &geometry.settings.reference_radiance {
-            Some(given) => reference.copy_from_slice(given),
-            None => light.reference_radiance(scene, &mut reference),
-        }
         let coupling = geometry.coupling()?;
-        let shape = settings::shape(geometry.settings.max_bounces, bands);
-        let unknowns = elements.unknowns();
-        let mut direct = std::vec![0.0; unknowns * shape.stride()];
-        if let Some(sky) = &light.sky {
-            let accuracy = settings::sky_accuracy(geometry.settings.of_image());
-            self.split(&mut direct, shape.stride(), |range, out| {
-                direct::sky_rows(scene, elements, &coupling, sky, accuracy, range, shape, out)
-            })?;
-        }
-        let mut lit_share = std::vec![0.0; unknowns];
-        let mut suns = Suns::default();
-        if let Some(sun) = &light.sun {
-            let rays = self.split(&mut lit_share, 1, |range, out| {
-                direct::sun_rows(scene, &geometry.bvh, elements, &coupling, sun, range, out)
-            })?;
-            report.rays.sun += rays.iter().sum::<u64>();
-            report.rays.sun += self.beams(geometry, sun, shape, &mut direct, &mut suns)?;
-        }
-        report.count_light(&light, unknowns);
-        report.bytes.light = 8 * (direct.len() + lit_share.len() + suns.slots.len() + suns.thrown.len());
-        report.seconds.light = clock.lap();
-        let (coupling, light) = (&coupling, &light);
-        let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
-        let mut solving = Solving { radiance: std::vec![0.0; unknowns * bands], ..Solving::default() };
-        let mut irradiance =
-            self.solve(&system, &geometry.settings, &reference, &mut solving, &mut report)?;
-        if shape.levels == 1 {
-            let mut missed = std::vec![0.0; unknowns * bands];
-            self.split(&mut missed, bands, |range, out| {
-                system.slopes(range, &irradiance, out);
-                Ok(())
-            })?;
-            direct::add(&missed, shape, &mut direct);
-            let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
-            irradiance = self.solve(&system, &geometry.settings, &reference, &mut solving, &mut report)?;
-        }
-        let radiance = solving.radiance;
-        limits::check_radiance(&radiance, bands)?;
-        let system = System { scene, elements, coupling, light, direct: &direct, sun: &lit_share, shape };
-        let sides = elements.facet_sides();
-        suns.images().take_off(shape, sides, |unknown| elements.facet_side(unknown), &mut irradiance);
-        system.extend(&mut irradiance);
-        let variance = self.accuracy(&system, &radiance, &reference)?;
-        let brightest = limits::brightest(scene, light, &reference, &radiance);
-        report.reference_radiance = reference.clone();
-        report.seconds.radiosity = clock.lap();
-        let light = *light;
-        let sun = lit_share;
-        Ok(Lit { geometry, light, shape, reference, irradiance, sun, suns, variance, brightest, report })
-    }
-
-    /// Expected squared error of each unknown.
-    fn accuracy(&self, system: &System<'_>, radiance: &[f64], reference: &[f64]) -> Result<Vec<f32>, Error> {
-        let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
-        let mut differences = std::vec![[0.0; 2]; unknowns * bands];
-        self.split(&mut differences, bands, |range, out| {
-            accuracy::differences(system, radiance, reference, range, out)
-        })?;
-        let (mut carried, mut next) = (std::vec![0.0; unknowns * bands], std::vec![0.0; unknowns * bands]);
-        for number in 0..accuracy::carried(system.scene) {
-            let from = if number > 0 { &carried[..] } else { &[] };
-            self.split(&mut next, bands, |range, out| {
-                accuracy::carry(system, &differences, from, range, out)
-            })?;
-            core::mem::swap(&mut carried, &mut next);
-        }
-        let mut variance = std::vec![0.0; unknowns];
-        self.split(&mut variance, 1, |range, out| {
-            accuracy::rows(system, &differences, &carried, range, out)
-        })?;
-        Ok(variance)
-    }
-
-    /// Adds the sunlight that mirrors throw to the irradiance table; returns the rays traced.
-    fn beams(
-        &self,
-        geometry: &Geometry<'_>,
-        sun: &Sun<'_>,
-        shape: Shape,
-        table: &mut [f64],
-        suns: &mut Suns,
-    ) -> Result<u64, Error> {
-        let scene = &geometry.scene;
-        let Settings { max_bounces, all_irradiances, .. } = geometry.settings;
-        let tolerance = geometry.settings.of_image();
-        let Some(settings) = settings::beams(scene, sun, tolerance, max_bounces, all_irradiances) else {
-            return Ok(0);
-        };
-        let rows = scene.facets() * scene.sides();
-        let slabs = self.blocks(rows, 1024, scene.bands(), |range, memory| {
-            beam::fill(scene, &geometry.bvh, &geometry.elements, sun, &settings, range, memory)
-        })?;
-        let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
-        let beams = Coupling::new(&blocks, rows)?;
-        *suns = Suns {
-            slots: std::vec![0; sun_image::places(rows)],
-            thrown: std::vec![0.0; geometry.elements.unknowns() * shape.levels * shape.bands],
-        };
-        let mut noting = Noting { slots: &mut suns.slots, thrown: &mut suns.thrown };
-        beam::add(&beams, (&geometry.coupling()?, &geometry.elements), sun, shape, table, &mut noting);
-        Ok(beams.rows(0..rows).map(|(_, r)| r.row.all_rays()).sum())
-    }
-
-    /// Solves for the diffuse radiance, the second time from the solution before; returns the irradiance table.
-    fn solve(
-        &self,
-        system: &System<'_>,
-        settings: &Settings,
-        reference: &[f64],
-        solving: &mut Solving,
-        report: &mut Report,
-    ) -> Result<Vec<f64>, Error> {
-        let (bands, unknowns) = (system.shape.bands, system.elements.unknowns());
-        let mut irradiance = std::vec![0.0; unknowns * system.shape.stride()];
-        if system.shape.levels == 1 {
-            report.certified.solver = self.converge(system, settings, reference, solving, report)?;
-            self.split(&mut irradiance, system.shape.stride(), |range, out| {
-                system.gather(range, 0, |_| &solving.radiance, out)
-            })?;
-            return Ok(irradiance);
-        }
-        let mut orders = std::vec![core::mem::take(&mut solving.radiance)];
-        orders.iter_mut().try_for_each(|first| self.start(system, first))?;
-        for level in 0..system.shape.levels {
-            self.split(&mut irradiance, system.shape.stride(), |range, out| {
-                system.gather(range, level, |order| &orders[order], out)
-            })?;
-            let mut next = std::vec![0.0; unknowns * bands];
-            self.split(&mut next, bands, |range, out| {
-                system.reflect(range, level, &irradiance, out);
-                Ok(())
-            })?;
-            orders.push(next);
-            report.sweeps += 1;
-        }
-        solving.radiance = orders.pop().unwrap_or_default();
-        Ok(irradiance)
-    }
-
-    /// The radiances before any reflection.
-    fn start(&self, system: &System<'_>, radiance: &mut [f64]) -> Result<(), Error> {
-        self.split(radiance, system.shape.bands, |range, out| {
-            system.start(range, out);
-            Ok(())
-        })?;
-        Ok(())
-    }
-
-    /// Sweeps until the bound on the error is a small part of the tolerance; returns the bound.
-    fn converge(
-        &self,
-        system: &System<'_>,
-        settings: &Settings,
-        reference: &[f64],
-        solving: &mut Solving,
-        report: &mut Report,
-    ) -> Result<f64, Error> {
-        let Settings { tolerance, max_bounces, .. } = *settings;
-        let bounds = match solving.bounds {
-            Some(bounds) => bounds,
-            None => self.bounds(system, settings, solving, report)?,
-        };
-        // a sweep from a solution adds a reflection to all that it has
-        if solving.bounds.is_none() || max_bounces.is_some() {
-            self.start(system, &mut solving.radiance)?;
-        }
-        solving.bounds = Some(bounds);
-        let Solving { radiance, next, history, .. } = solving;
-        let mut solver = Solver::new(bounds.0, bounds.1, tolerance, max_bounces, !history.is_empty());
-        self.iterate(&mut solver, system, [radiance, next], history, |range, from, to, relax| {
-            system.relaxed_sweep(range, from, to, reference, relax)
-        })?;
-        solver.finish(radiance, reference, max_bounces);
-        report.sweeps += solver.done;
-        Ok(solver.error)
-    }
-
-    /// The contraction of a sweep and, where it needs one, the bound on the inverse; they hold for any light.
-    fn bounds(
-        &self,
-        system: &System<'_>,
-        settings: &Settings,
-        solving: &mut Solving,
-        report: &mut Report,
-    ) -> Result<(f64, Option<f64>), Error> {
-        let Settings { tolerance, max_bounces, .. } = *settings;
-        let size = solving.radiance.len();
-        let mut probe = std::vec![0u8; system.elements.unknowns()];
-        let parts = self.split(&mut probe, 1, |range, _| Ok(system.contraction(range)))?;
-        let q = parts.into_iter().fold(0.0, f64::max);
-        solving.next = std::vec![0.0; size];
-        solving.history = std::vec![0.0; solver::kept(system.scene, tolerance, max_bounces) * size];
-        let deficits = size.min(solving.history.len());
-        self.split(solving.history.head_mut(deficits), system.shape.bands, |range, out| {
-            system.deficits(range, out);
-            Ok(())
-        })?;
-        if !Solver::is_closed(q, max_bounces) {
-            return Ok((q, None));
-        }
-        let Solving { radiance, next, history, .. } = solving;
-        radiance.fill(0.0);
-        let mut unit = Solver::unit();
-        self.iterate(&mut unit, system, [radiance, next], history, |range, from, to, relax| {
-            system.unit_sweep(range, from, to, relax)
-        })?;
-        report.sweeps += unit.done;
-        Ok((q, Some(unit.inverse(next, q)?)))
-    }
-
-    /// Iterates to the end: the latest solution stands in the first of both, the one before in the second.
-    fn iterate(
-        &self,
-        solver: &mut Solver,
-        system: &System<'_>,
-        [latest, next]: [&mut Vec<f64>; 2],
-        history: &mut [f64],
-        sweep: impl Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync,
-    ) -> Result<(), Error> {
-        let bands = system.shape.bands;
-        let mut history = History::new(history, latest.len());
-        while solver.more() {
-            let relaxation = solver.relaxation();
-            let changes = self.split(next, bands, |range, out| Ok(sweep(range, latest, out, relaxation)))?;
-            core::mem::swap(latest, next);
-            if solver.took(changes.into_iter().fold(0.0, f64::max)) {
-                history.note(next, latest, bands, |at| system.weight(at));
+        let lighting = Lighting { scene, bvh, elements, coupling: &coupling, light: &light, settings };
+        let sizes = Sizes::new(scene, elements, &light, settings)?;
+        let size = sizes.solution;
+        let mut tables = Tables::new(&size);
+        let mut scratch = Memory::new(sizes.scratch().bytes()?);
+        let mut scratch = sizes.take_scratch(&mut Arena::new(scratch.bytes_mut(), 0)?)?;
+        let (mut memory, mut run) = (tables.memory(), Run::new(self));
+        let given = geometry.reference.as_deref();
+        let mut sun_rays = lighting.direct(given, &mut memory, &mut scratch, &mut run)?;
+        let (mut beams, mut bytes) = (Beams::default(), sizes.beams(run.lanes()));
+        while let Err(error) =
+            beams.add(&lighting, &mut memory, &mut scratch, Memory::new(bytes).bytes_mut(), &mut run)
+        {
+            match error {
+                Error::BufferTooSmall { needed, .. } if needed < MOST_BEAM_BYTES => bytes = needed,
+                error => return Err(error),
             }
         }
-        Ok(())
+        sun_rays += beams.rays;
+        report.rays.sun += sun_rays;
+        report.count_light(&light, size.unknowns);
+        report.bytes.light = 8 * (size.table() + size.unknowns + size.places + size.thrown());
+        report.seconds.light = clock.lap();
+        let numbers = lighting.solve(memory, &mut scratch, sun_rays, &mut run)?.numbers;
+        report.sweeps = numbers.sweeps as u32;
+        report.certified.solver = numbers.solver;
+        report.reference_radiance = tables.reference.clone();
+        report.seconds.radiosity = clock.lap();
+        Ok(Lit { geometry, light, shape: sizes.shape(), tables, numbers, report })
     }
 
     /// Runs `work` over ranges of rows, each with its part of `out` (`stride` values a row), in parallel.
@@ -670,23 +472,34 @@ impl Geometry<'_> {
 impl Lit<'_> {
     /// The solved scene as the kernel's ray and image routines take it.
     pub fn solved(&self) -> Solved<'_> {
-        let settings = &self.geometry.settings;
+        let Geometry { scene, bvh, elements, settings, rays, .. } = self.geometry;
+        let Solution { shape, reference, irradiance, images, variance, numbers, .. } = self.solution();
         Solved {
-            scene: &self.geometry.scene,
-            bvh: &self.geometry.bvh,
-            elements: &self.geometry.elements,
+            scene,
+            bvh,
+            elements,
             light: &self.light,
-            irradiance: &self.irradiance,
-            images: self.suns.images(),
+            irradiance,
+            images,
+            shape,
+            variance,
+            reference,
+            brightest: numbers.brightest,
+            settings: settings.chains(*rays),
+        }
+    }
+
+    /// The record of the solution.
+    pub fn solution(&self) -> Solution<'_> {
+        let Tables { reference, irradiance, sun, slots, thrown, variance } = &self.tables;
+        Solution {
             shape: self.shape,
-            variance: &self.variance,
-            reference: &self.reference,
-            brightest: self.brightest,
-            settings: settings::chains(
-                (settings.of_image(), settings.tolerance),
-                settings.max_bounces,
-                self.geometry.rays,
-            ),
+            reference,
+            irradiance,
+            sun,
+            images: SunImages { slots, thrown },
+            variance,
+            numbers: self.numbers,
         }
     }
 
@@ -714,7 +527,7 @@ impl Lit<'_> {
 
     /// Reference radiance, one value per band.
     pub fn reference(&self) -> &[f64] {
-        &self.reference
+        &self.tables.reference
     }
 
     /// What was done so far.
@@ -732,7 +545,15 @@ impl Lit<'_> {
             (std::vec![0.0; self.shape.bands], std::vec![0.0; self.shape.bands]);
         for facet in 0..scene.facets() {
             for side in 0..scene.sides() {
-                facets::side(&solved, &coupling, &self.sun, facet, side, &mut irradiance, &mut radiance);
+                facets::side(
+                    &solved,
+                    &coupling,
+                    &self.tables.sun,
+                    facet,
+                    side,
+                    &mut irradiance,
+                    &mut radiance,
+                );
                 each(facet, side, scene.area(facet), &irradiance, &radiance);
             }
         }

@@ -73,6 +73,7 @@ pub mod rays;
 pub mod rounds;
 pub mod scene;
 pub mod settings;
+pub mod stages;
 pub mod view;
 
 pub use base::error::{Error, Field};

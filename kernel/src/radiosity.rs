@@ -8,6 +8,7 @@ pub mod accuracy;
 pub mod beam;
 pub mod direct;
 pub mod limits;
+pub mod solution;
 pub mod solver;
 pub mod sun_image;
 

@@ -14,6 +14,59 @@ use crate::scene::Scene;
 use crate::scene::sun::Sun;
 use crate::view::chain::ChainSettings;
 
+/// What a caller asks of the stages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Wanted error of the diffuse solution, relative to the reference radiance.
+    pub tolerance: f64,
+    /// Wanted error of images; no more than `tolerance`.
+    pub image_tolerance: f64,
+    /// Light reflected more often does not count; `None`: by tolerance.
+    pub max_bounces: Option<u32>,
+    /// Irradiance of all facets is wanted, also of those that reflect nothing diffusely.
+    pub all_irradiances: bool,
+    /// Directions of blocked and mirrored light are kept.
+    pub directional: bool,
+    /// The most first rays of all rows of the coupling; `None`: by tolerance.
+    pub ray_budget: Option<u64>,
+}
+
+impl Settings {
+    /// Settings of which only the solution's and the images' tolerances are given.
+    ///
+    /// # Errors
+    /// [`Error::Range`] for one outside 1e-6 to 0.1.
+    pub fn new(tolerance: f64, image_tolerance: Option<f64>) -> Result<Settings, Error> {
+        check_tolerance(tolerance)?;
+        let image = image_tolerance.unwrap_or(tolerance);
+        check_tolerance(image)?;
+        Ok(Settings {
+            tolerance,
+            image_tolerance: image.min(tolerance),
+            max_bounces: None,
+            all_irradiances: false,
+            directional: true,
+            ray_budget: None,
+        })
+    }
+
+    /// How the rows of a scene's coupling are computed.
+    pub fn rows(&self, scene: &Scene<'_>) -> RowSettings {
+        RowSettings::new(scene, self.tolerance, self.max_bounces, self.directional, self.all_irradiances)
+    }
+
+    /// As [`Settings::rows`], for so many rows within the budget of rays.
+    pub fn rows_within(&self, scene: &Scene<'_>, count: usize) -> RowSettings {
+        let rows = self.rows(scene);
+        self.ray_budget.map_or(rows, |budget| rows.within(count, budget))
+    }
+
+    /// How the chains of images are followed; `rays` is the coupling's.
+    pub fn chains(&self, rays: u64) -> ChainSettings {
+        chains((self.image_tolerance, self.tolerance), self.max_bounces, rays)
+    }
+}
+
 /// Refuses a tolerance outside 1e-6 to 0.1.
 pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {
     if (1e-6..=0.1).contains(&tolerance) {

@@ -6,8 +6,7 @@
 #![allow(dead_code)]
 
 use blik_kernel::Error;
-use blik_kernel::accuracy::{self, Own};
-use blik_kernel::beam::{self, BeamSettings};
+use blik_kernel::arena::Arena;
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput};
 use blik_kernel::chain::Solved;
@@ -16,16 +15,16 @@ use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
 use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Tally, Target};
-use blik_kernel::light::{self, Light, Shape};
-use blik_kernel::policy;
-use blik_kernel::radiosity::{System, bound, sweeps};
-use blik_kernel::scene::{MAX_BANDS, Scene, SceneInput};
+use blik_kernel::light::Light;
+use blik_kernel::radiosity::solution::Solution;
+use blik_kernel::scene::{Scene, SceneInput};
+use blik_kernel::settings;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyInput, SkyModel};
+use blik_kernel::stages::{Beams, Executor, Lighting, Merge, Sizes};
 use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
-use blik_kernel::sun_image::{self, Noting, SunImages};
 use std::ops::Range;
 
 /// How a run is carried out; what it computes does not depend on it, but for the tolerance.
@@ -64,36 +63,28 @@ pub struct Workspace {
     bvh: Vec<u8>,
     elements: Vec<u8>,
     blocks: Vec<Vec<u8>>,
-    beams: Vec<Vec<u8>>,
     trees: Vec<u8>,
     planes: Vec<u8>,
     pub tables: Tables,
     pub view: Outputs,
 }
 
-/// What light and solution write.
+/// Memory of a solution and of the stages that make it.
 pub struct Tables {
-    direct: Vec<f64>,
-    next: Vec<f64>,
-    variance: Vec<f32>,
-    differences: Vec<Own>,
-    carried: [Vec<f32>; 2],
-    /// Mean of cos V of the sun for each unknown.
-    pub sun: Vec<f64>,
-    /// Diffuse radiance of each unknown, each band.
-    pub radiance: Vec<f64>,
-    /// Mean and gradients of each unknown's irradiance, each band.
-    pub irradiance: Vec<f64>,
-    /// Images of the sun, and what they throw; how much of both is in use.
-    slots: Vec<u64>,
-    thrown: Vec<f64>,
-    images: (usize, usize),
+    kept: Vec<u8>,
+    scratch: Vec<u8>,
+    beams: Vec<u8>,
+    /// The bits of reference radiance, irradiances, sun and expected errors; as many as are in use.
+    bits: Vec<u64>,
+    used: usize,
 }
 
-impl Tables {
-    fn images(&self) -> SunImages<'_> {
-        SunImages { slots: &self.slots[..self.images.0], thrown: &self.thrown[..self.images.1] }
-    }
+/// Notes the bits of a solution; returns how many.
+fn note(solution: &Solution<'_>, bits: &mut [u64]) -> usize {
+    let Solution { reference, irradiance, sun, variance, .. } = solution;
+    let wide = reference.iter().chain(*irradiance).chain(*sun).map(|x| x.to_bits());
+    let all = wide.chain(variance.iter().map(|x| u64::from(x.to_bits())));
+    bits.iter_mut().zip(all).map(|(to, from)| *to = from).count()
 }
 
 /// What a view writes.
@@ -113,23 +104,17 @@ impl Workspace {
             bvh: vec![0xa5; Bvh::bytes(facets).unwrap()],
             elements: vec![0xa5; 4 * (unknowns + 4 * facets) + 1024],
             blocks: vec![vec![0xa5; block]; PARTS],
-            beams: vec![vec![0xa5; block]; PARTS],
             // what a table of planes takes at most
             planes: vec![0xa5; 10 << 20],
             // trees of quarters, at the tightest tolerance of these tests
             trees: vec![0xa5; Cut::bytes(facets, 5e-4).unwrap()],
+            // solutions of small rooms: sixteen values of each unknown and band, and those of the images of the sun
             tables: Tables {
-                direct: vec![f64::NAN; 3 * bands * unknowns],
-                next: vec![f64::NAN; bands * unknowns],
-                variance: vec![f32::NAN; unknowns],
-                differences: vec![[f32::NAN; 2]; bands * unknowns],
-                carried: [(); 2].map(|()| vec![f32::NAN; bands * unknowns]),
-                sun: vec![f64::NAN; unknowns],
-                radiance: vec![f64::NAN; bands * unknowns],
-                irradiance: vec![f64::NAN; 3 * bands * unknowns],
-                slots: vec![u64::MAX; sun_image::places(2 * facets)],
-                thrown: vec![f64::NAN; bands * unknowns],
-                images: (0, 0),
+                kept: vec![0xa5; 64 * (8 * bands * unknowns + 2 * facets) + 65536],
+                scratch: vec![0xa5; 256 * bands * unknowns + 4096],
+                beams: vec![0xa5; PARTS * block],
+                bits: vec![0; 8 * bands * unknowns],
+                used: 0,
             },
             view: Outputs {
                 scratch: vec![0xa5; 1 << 20],
@@ -145,11 +130,52 @@ impl Workspace {
         self.view.pixels.iter().chain(self.view.terms.iter().flatten()).map(|p| p.to_bits()).collect()
     }
 
-    /// The bits of the first `unknowns` unknowns' irradiances, radiances and sun.
-    pub fn table_bits(&self, unknowns: usize, bands: usize) -> Vec<u64> {
-        let Tables { irradiance, radiance, sun, .. } = &self.tables;
-        let parts = [&irradiance[..3 * bands * unknowns], &radiance[..bands * unknowns], &sun[..unknowns]];
-        parts.iter().flat_map(|p| p.iter()).map(|x| x.to_bits()).collect()
+    /// The bits of the solution.
+    pub fn table_bits(&self) -> Vec<u64> {
+        self.tables.bits[..self.tables.used].to_vec()
+    }
+}
+
+/// Runs ranges one after the other, last to first.
+struct Backward {
+    parts: usize,
+}
+
+impl Executor for Backward {
+    type Error = Error;
+
+    fn lanes(&self) -> usize {
+        self.parts
+    }
+
+    fn pieces<T: Send, R: Merge>(
+        &mut self,
+        out: &mut [T],
+        piece: usize,
+        _share: f64,
+        work: impl Fn(usize, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<R, Error> {
+        let mut all = R::default();
+        for (number, part) in out.chunks_mut(piece).enumerate().rev() {
+            all.merge(work(number, part)?);
+        }
+        Ok(all)
+    }
+
+    /// As many ranges as asked for, whatever their rows.
+    fn rows<T: Send, R: Merge>(
+        &mut self,
+        out: &mut [T],
+        stride: usize,
+        _share: f64,
+        work: impl Fn(Range<usize>, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<R, Error> {
+        let (mut all, rows) = (R::default(), out.len() / stride.max(1));
+        split(self.parts, rows, stride, out, |range, part| {
+            all.merge(work(range, part)?);
+            Ok(())
+        })?;
+        Ok(all)
     }
 }
 
@@ -212,8 +238,8 @@ pub fn run(
     // uniform skies need no directions: what nothing hides is in closed form then
     let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
     let facing = Facing::new(&scene, &bvh, !directional, &mut work.planes)?;
-    let settings = RowSettings::new(&scene, plan.tolerance, None, directional, false);
-    let probing = policy::probing(&settings);
+    let row_settings = RowSettings::new(&scene, plan.tolerance, None, directional, false);
+    let probing = settings::probing(&row_settings);
     let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
     loop {
         let (fresh, unevenness) = cut.work();
@@ -229,7 +255,7 @@ pub fn run(
     let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
     let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
-        rows::fill(&scene, &bvh, &elements, &facing, &settings, range, memory)
+        rows::fill(&scene, &bvh, &elements, &facing, &row_settings, range, memory)
     })?;
     let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
     counts.visibility += coupling.rays();
@@ -241,228 +267,80 @@ pub fn run(
         sky: sky.map(|s| Sky::new(s, scene.bands())).transpose()?,
         sun: sun.map(|s| Sun::new(s, scene.bands())).transpose()?,
     };
-    let shape = Shape { levels: 1, bands: scene.bands() };
-    let mut reference = [0.0; MAX_BANDS];
-    light.reference_radiance(&scene, &mut reference[..shape.bands]);
-    let reference = &reference[..shape.bands];
-    let stage = Stage {
+    let asked = settings::Settings::new(plan.tolerance, None)?;
+    let lighting = Lighting {
         scene: &scene,
         bvh: &bvh,
         elements: &elements,
         coupling: &coupling,
         light: &light,
-        shape,
-        reference,
-        plan,
+        settings: &asked,
     };
-    stage.shine(&mut work.tables, &mut work.beams, &mut counts)?;
-    let brightest = stage.solve(&mut work.tables, &mut counts)?;
-    stage.view(&work.tables, brightest, camera, &mut work.view, &mut counts)?;
+    let Tables { kept, scratch, beams: beam_memory, bits, used } = &mut work.tables;
+    let mut run = Backward { parts };
+    let sizes = Sizes::new(&scene, &elements, &light, &asked)?;
+    let needed = sizes.solution.need().bytes()?;
+    let mut memory = sizes.solution.take(&mut Arena::new(&mut kept[..needed], needed)?)?;
+    let needed = sizes.scratch().bytes()?;
+    let mut scratch = sizes.take_scratch(&mut Arena::new(&mut scratch[..needed], needed)?)?;
+    counts.sun = lighting.direct(None, &mut memory, &mut scratch, &mut run)?;
+    let mut beams = Beams::default();
+    beams.add(&lighting, &mut memory, &mut scratch, beam_memory, &mut run)?;
+    counts.beams = beams.rays;
+    let solution = lighting.solve(memory, &mut scratch, counts.sun + counts.beams, &mut run)?;
+    counts.sweeps = solution.numbers.sweeps as u32;
+    let Solution { shape, reference, irradiance, images, variance, numbers, .. } = solution;
+    let solved = Solved {
+        scene: &scene,
+        bvh: &bvh,
+        elements: &elements,
+        light: &light,
+        irradiance,
+        images,
+        shape,
+        variance,
+        reference,
+        brightest: numbers.brightest,
+        settings: asked.chains(coupling.rays()),
+    };
+    view(&solved, parts, camera, &mut work.view, &mut counts)?;
+    *used = note(&solution, bits);
     Ok(counts)
 }
 
-/// What the later stages share.
-struct Stage<'a> {
-    scene: &'a Scene<'a>,
-    bvh: &'a Bvh<'a>,
-    elements: &'a Elements<'a>,
-    coupling: &'a Coupling<'a>,
-    light: &'a Light<'a>,
-    shape: Shape,
-    reference: &'a [f64],
-    plan: &'a Plan,
-}
-
-impl Stage<'_> {
-    /// Direct light.
-    fn shine(&self, tables: &mut Tables, beams: &mut [Vec<u8>], counts: &mut Counts) -> Result<(), Error> {
-        let (parts, stride, tolerance) = (self.plan.parts, self.shape.stride(), self.plan.tolerance);
-        let (scene, bvh, elements) = (self.scene, self.bvh, self.elements);
-        let direct = &mut tables.direct[..counts.unknowns * stride];
-        direct.fill(0.0);
-        if let Some(sky) = &self.light.sky {
-            split(parts, counts.unknowns, stride, direct, |range, out| {
-                light::sky_rows(scene, elements, self.coupling, sky, 0.05 * tolerance, range, self.shape, out)
-            })?;
-        }
-        let lit = &mut tables.sun[..counts.unknowns];
-        lit.fill(0.0);
-        tables.images = (0, 0);
-        let Some(sun) = &self.light.sun else { return Ok(()) };
-        split(parts, counts.unknowns, 1, lit, |range, out| {
-            counts.sun += light::sun_rows(scene, bvh, elements, self.coupling, sun, range, out)?;
-            Ok(())
-        })?;
-        let settings =
-            BeamSettings::new(scene, sun, (100.0 / tolerance).clamp(32768.0, 1e8), 1e-3 * tolerance, 1000);
-        let mirrors = scene.facets() * scene.sides();
-        let blocks = fill_blocks(parts, mirrors, beams, |range, memory| {
-            beam::fill(scene, bvh, elements, sun, &settings, range, memory)
-        })?;
-        let thrown = Coupling::new(&blocks[..parts], mirrors)?;
-        tables.images = (sun_image::places(mirrors), counts.unknowns * self.shape.bands);
-        let (slots, means) = (&mut tables.slots[..tables.images.0], &mut tables.thrown[..tables.images.1]);
-        slots.fill(0);
-        means.fill(0.0);
-        let mut noting = Noting { slots, thrown: means };
-        beam::add(&thrown, (self.coupling, elements), sun, self.shape, direct, &mut noting);
-        counts.beams = thrown.rows(0..mirrors).map(|(_, r)| r.row.all_rays()).sum();
-        Ok(())
+/// Image and signature.
+fn view(
+    solved: &Solved<'_>,
+    parts: usize,
+    camera: &CameraInput,
+    out: &mut Outputs,
+    counts: &mut Counts,
+) -> Result<(), Error> {
+    let bands = solved.shape.bands;
+    let camera = Camera::new(camera, solved.scene)?;
+    let bytes = image::scratch_bytes(&camera, bands)?;
+    let scratch = &mut out.scratch[..bytes];
+    let stride = camera.columns() * bands;
+    let [first, second, third] = &mut out.terms;
+    let mut rest = [&mut out.pixels[..], first, second, third];
+    for part in (0..parts).rev() {
+        let range = part * camera.rows() / parts..(part + 1) * camera.rows() / parts;
+        let [image, a, b, c] = rest.map(|all| {
+            let (before, own) = all.split_at_mut(range.start * stride);
+            (before, own)
+        });
+        rest = [image.0, a.0, b.0, c.0];
+        let mut target = Target { image: image.1, components: [a.1, b.1, c.1] };
+        counts.image.add(&image::rows(solved, &camera, range, &mut target, scratch)?);
     }
-
-    /// Radiances and irradiances; returns the largest radiance that a ray can see over the reference.
-    fn solve(&self, tables: &mut Tables, counts: &mut Counts) -> Result<f64, Error> {
-        let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
-        let (rows, stride) = (unknowns * bands, self.shape.stride());
-        let Tables { direct, sun, radiance, next, irradiance, slots, thrown, images, .. } = &mut *tables;
-        let (direct, irradiance) = (&mut direct[..unknowns * stride], &mut irradiance[..unknowns * stride]);
-        let system = self.system(direct, &sun[..unknowns]);
-        split(parts, unknowns, bands, &mut radiance[..rows], |range, out| {
-            system.start(range, out);
-            Ok(())
-        })?;
-        self.sweeps(
-            direct,
-            &sun[..unknowns],
-            [&mut radiance[..rows], &mut next[..rows]],
-            irradiance,
-            counts,
-        )?;
-        let missed = &mut next[..rows];
-        let system = self.system(direct, &sun[..unknowns]);
-        split(parts, unknowns, bands, missed, |range, out| {
-            system.slopes(range, irradiance, out);
-            Ok(())
-        })?;
-        light::add(missed, self.shape, direct);
-        self.sweeps(
-            direct,
-            &sun[..unknowns],
-            [&mut radiance[..rows], &mut next[..rows]],
-            irradiance,
-            counts,
-        )?;
-        let images = SunImages { slots: &slots[..images.0], thrown: &thrown[..images.1] };
-        let side_of = |unknown| self.elements.facet_side(unknown);
-        images.take_off(self.shape, self.elements.facet_sides(), side_of, irradiance);
-        self.system(direct, &sun[..unknowns]).extend(irradiance);
-        let brightest = policy::brightest(self.scene, self.light, self.reference, &radiance[..rows]);
-        self.errors(tables, unknowns)?;
-        Ok(brightest)
-    }
-
-    /// The expected squared error of each unknown.
-    fn errors(&self, tables: &mut Tables, unknowns: usize) -> Result<(), Error> {
-        let (parts, bands, rows) = (self.plan.parts, self.shape.bands, unknowns * self.shape.bands);
-        let Tables { direct, sun, radiance, variance, differences, carried: [from, to], .. } = tables;
-        let system = self.system(&direct[..unknowns * self.shape.stride()], &sun[..unknowns]);
-        let own = &mut differences[..rows];
-        split(parts, unknowns, bands, own, |range, out| {
-            accuracy::differences(&system, &radiance[..rows], self.reference, range, out)
-        })?;
-        let (mut from, mut to) = (&mut from[..rows], &mut to[..rows]);
-        for number in 0..accuracy::carried(self.scene) {
-            let known = if number > 0 { &from[..] } else { &[] };
-            split(parts, unknowns, bands, to, |range, out| accuracy::carry(&system, own, known, range, out))?;
-            std::mem::swap(&mut from, &mut to);
-        }
-        split(parts, unknowns, 1, &mut variance[..unknowns], |range, out| {
-            accuracy::rows(&system, own, from, range, out)
-        })
-    }
-
-    fn system<'b>(&'b self, direct: &'b [f64], sun: &'b [f64]) -> System<'b> {
-        System {
-            scene: self.scene,
-            elements: self.elements,
-            coupling: self.coupling,
-            light: self.light,
-            direct,
-            sun,
-            shape: self.shape,
-        }
-    }
-
-    /// Sweeps to the end from what the first of both tables holds, and gathers; the radiances stand there then.
-    fn sweeps(
-        &self,
-        direct: &[f64],
-        sun: &[f64],
-        [mut from, mut to]: [&mut [f64]; 2],
-        irradiance: &mut [f64],
-        counts: &mut Counts,
-    ) -> Result<(), Error> {
-        let (parts, bands, unknowns) = (self.plan.parts, self.shape.bands, counts.unknowns);
-        let system = self.system(direct, sun);
-        let q = system.contraction(0..unknowns);
-        let goal = 1e-3 * self.plan.tolerance;
-        let most = sweeps(q, goal) + 200;
-        let (mut error, mut done) = (f64::INFINITY, 0);
-        while error > goal && done < most {
-            let mut change: f64 = 0.0;
-            split(parts, unknowns, bands, to, |range, out| {
-                change = change.max(system.sweep(range, from, out, self.reference));
-                Ok(())
-            })?;
-            std::mem::swap(&mut from, &mut to);
-            done += 1;
-            error = bound(change, q);
-        }
-        counts.sweeps += done;
-        to.copy_from_slice(from);
-        split(parts, unknowns, self.shape.stride(), irradiance, |range, out| {
-            system.gather(range, 0, |_| from, out)
-        })
-    }
-
-    /// Image and signature.
-    fn view(
-        &self,
-        tables: &Tables,
-        brightest: f64,
-        camera: &CameraInput,
-        out: &mut Outputs,
-        counts: &mut Counts,
-    ) -> Result<(), Error> {
-        let (parts, bands, tolerance) = (self.plan.parts, self.shape.bands, self.plan.tolerance);
-        let solved = Solved {
-            scene: self.scene,
-            bvh: self.bvh,
-            elements: self.elements,
-            light: self.light,
-            irradiance: &tables.irradiance[..counts.unknowns * self.shape.stride()],
-            images: tables.images(),
-            shape: self.shape,
-            variance: &tables.variance[..counts.unknowns],
-            reference: self.reference,
-            brightest,
-            settings: policy::chains((tolerance, tolerance), None, self.coupling.rays()),
-        };
-        let camera = Camera::new(camera, self.scene)?;
-        let bytes = image::scratch_bytes(&camera, bands)?;
-        let scratch = &mut out.scratch[..bytes];
-        let stride = camera.columns() * bands;
-        let [first, second, third] = &mut out.terms;
-        let mut rest = [&mut out.pixels[..], first, second, third];
-        for part in (0..parts).rev() {
-            let range = part * camera.rows() / parts..(part + 1) * camera.rows() / parts;
-            let [image, a, b, c] = rest.map(|all| {
-                let (before, own) = all.split_at_mut(range.start * stride);
-                (before, own)
-            });
-            rest = [image.0, a.0, b.0, c.0];
-            let mut target = Target { image: image.1, components: [a.1, b.1, c.1] };
-            counts.image.add(&image::rows(&solved, &camera, range, &mut target, scratch)?);
-        }
-        let view = View::new(&solved, camera.forward(), out.sums.len())?;
-        let scratch = &mut out.scratch[..signature::scratch_bytes()?];
-        split(parts, view.rows(), 1, &mut out.sums, |range, out| {
-            signature::rows(&solved, &view, range, scratch, out)
-        })?;
-        let mut sums = Sums::ZERO;
-        out.sums.iter().for_each(|row| sums.add(row));
-        (counts.projected_area, counts.signature_rays) = (sums.area, sums.rays);
-        counts.intensity.copy_from_slice(&sums.intensity[..4]);
-        Ok(())
-    }
+    let view = View::new(solved, camera.forward(), out.sums.len())?;
+    let scratch = &mut out.scratch[..signature::scratch_bytes()?];
+    split(parts, view.rows(), 1, &mut out.sums, |range, out| {
+        signature::rows(solved, &view, range, scratch, out)
+    })?;
+    let mut sums = Sums::ZERO;
+    out.sums.iter().for_each(|row| sums.add(row));
+    (counts.projected_area, counts.signature_rays) = (sums.area, sums.rays);
+    counts.intensity.copy_from_slice(&sums.intensity[..4]);
+    Ok(())
 }

@@ -107,6 +107,12 @@ impl Need {
         Need { bytes, overflow: self.overflow | a | b | c }
     }
 
+    /// Room for another series behind this one.
+    pub const fn join(self, other: Need) -> Self {
+        let (bytes, over) = self.bytes.overflowing_add(other.bytes - (ALIGNMENT - 1));
+        Need { bytes, overflow: self.overflow | other.overflow | over }
+    }
+
     /// The bytes, or an error where the count exceeds the address space.
     pub const fn bytes(self) -> Result<usize, Error> {
         if self.overflow { Err(Error::TooMany { what: "bytes", limit: usize::MAX }) } else { Ok(self.bytes) }

@@ -1,0 +1,96 @@
+//! The driver of the stages: what is computed in which order, over memory that the caller hands in and by whoever runs ranges
+//! of rows for it.
+//!
+//! The owning layer runs ranges on its pool, the C library on its caller's threads, tests in a loop ([`Executor`]). All else
+//! is decided here, so that all of them give the same bits.
+
+mod beams;
+mod light;
+mod solve;
+
+pub use beams::Beams;
+pub use light::{Lighting, Scratch, Sizes};
+
+use crate::base::error::Error;
+use core::ops::Range;
+
+/// Runs the ranges of a stage, one after the other or at once.
+pub trait Executor {
+    /// What may go wrong: what the kernel says, and what the executor adds, as that it was told to stop.
+    type Error: From<Error>;
+
+    /// Ranges that run at once.
+    fn lanes(&self) -> usize;
+
+    /// Calls `work` once with each piece of `out`, of `piece` values each but for the last, and the piece's number; returns
+    /// what they gave, merged in any order. `share` is the part of the whole call's progress, 0 to 1.
+    fn pieces<T: Send, R: Merge>(
+        &mut self,
+        out: &mut [T],
+        piece: usize,
+        share: f64,
+        work: impl Fn(usize, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<R, Self::Error>;
+
+    /// Splits the rows of `out` (`stride` values each) into ranges and calls `work` with each of them and its part.
+    fn rows<T: Send, R: Merge>(
+        &mut self,
+        out: &mut [T],
+        stride: usize,
+        share: f64,
+        work: impl Fn(Range<usize>, &mut [T]) -> Result<R, Error> + Sync,
+    ) -> Result<R, Self::Error> {
+        let stride = stride.max(1);
+        let rows = (out.len() / stride).div_ceil((RANGES_PER_LANE * self.lanes()).max(1));
+        let rows = rows.clamp(RANGE_ROWS.0, RANGE_ROWS.1);
+        self.pieces(out, rows * stride, share, |number, part| {
+            work(number * rows..number * rows + part.len() / stride, part)
+        })
+    }
+}
+
+/// Ranges that a lane is given of each stage: enough that lanes which are done early find more.
+const RANGES_PER_LANE: usize = 16;
+
+/// Fewest and most rows of a range: below, starting it costs as much as the rows; above, progress is told too seldom.
+const RANGE_ROWS: (usize, usize) = (16, 4096);
+
+/// A result of ranges beside their output. Merging must give the same whatever the order.
+pub trait Merge: Default + Send {
+    /// Takes in another range's result.
+    fn merge(&mut self, other: Self);
+}
+
+impl Merge for () {
+    fn merge(&mut self, (): ()) {}
+}
+
+/// A count, as of rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Count(pub u64);
+
+impl Merge for Count {
+    fn merge(&mut self, other: Count) {
+        self.0 += other.0;
+    }
+}
+
+/// The largest of values that are not negative.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Largest(pub f64);
+
+impl Merge for Largest {
+    fn merge(&mut self, other: Largest) {
+        self.0 = f64::max(self.0, other.0);
+    }
+}
+
+/// Rows that one piece of work fills: enough pieces to balance two dozen threads, large enough that a block's head does not
+/// count.
+pub fn block_rows(rows: usize) -> usize {
+    rows.div_ceil(BLOCKS).clamp(BLOCK_ROWS.0, BLOCK_ROWS.1)
+}
+
+/// Blocks that the rows of a scene are split into, and the fewest and most rows of one.
+const BLOCKS: usize = 256;
+const BLOCK_ROWS: (usize, usize) = (16, 1024);

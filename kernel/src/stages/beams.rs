@@ -1,0 +1,89 @@
+//! Beams that mirrors throw: their rows in pieces of scratch memory, added to the direct light in the order of the rows.
+
+use super::light::{Lighting, SHARES, Scratch, beam_settings};
+use super::{Executor, block_rows};
+use crate::base::arena::ALIGNMENT;
+use crate::base::error::Error;
+use crate::base::index::IndexMut;
+use crate::coupling::{Block, Coupling, sink};
+use crate::radiosity::beam;
+use crate::radiosity::solution::SolutionMemory;
+use crate::radiosity::sun_image::Noting;
+use crate::settings;
+
+/// Beams on their way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Beams {
+    /// Rows whose light has been added.
+    rows: usize,
+    /// Their rays.
+    pub rays: u64,
+}
+
+impl Beams {
+    /// Adds the sunlight that mirrors throw, of all rows that are left. `memory`, of any content, is split among the lanes.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`] where no row fits: to be called again with as many bytes as that says.
+    pub fn add<X: Executor>(
+        &mut self,
+        of: &Lighting<'_>,
+        solution: &mut SolutionMemory<'_>,
+        scratch: &mut Scratch<'_>,
+        memory: &mut [u8],
+        run: &mut X,
+    ) -> Result<(), X::Error> {
+        let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
+        let shape = settings::shape(settings.max_bounces, scene.bands());
+        let mut images = Noting { slots: &mut *solution.slots, thrown: &mut *solution.thrown };
+        if self.rows == 0 {
+            images.slots.fill(0);
+            images.thrown.fill(0.0);
+        }
+        let Some((settings, sun)) = beam_settings(scene, light, settings).zip(light.sun.as_ref()) else {
+            return Ok(());
+        };
+        let all = scene.facets() * scene.sides();
+        let piece = block_rows(all);
+        let usual = sink::bytes(piece, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
+        let usual = usual.next_multiple_of(ALIGNMENT);
+        let size = memory.len();
+        let mut lanes = run.lanes().min(size / usual.max(1)).max(1);
+        while self.rows < all {
+            let part = if lanes > 1 { usual } else { size };
+            let first = self.rows;
+            let range = |lane: usize| (first + lane * piece).min(all)..(first + (lane + 1) * piece).min(all);
+            let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (all + lanes * piece) as f64;
+            run.pieces(memory.head_mut(lanes * part), part, share, |lane, memory| {
+                // so that a block of no rows stands there where none fits
+                memory.head_mut(2 * ALIGNMENT).fill(0);
+                if range(lane).is_empty() {
+                    return Ok(());
+                }
+                match beam::fill(scene, bvh, elements, sun, &settings, range(lane), memory) {
+                    Ok(_) | Err(Error::BufferTooSmall { .. }) => Ok(()),
+                    Err(error) => Err(error),
+                }
+            })?;
+            for memory in memory.chunks(part.max(1)).take(lanes) {
+                let Ok(block) = Block::open(memory) else { break };
+                let done = block.range();
+                if done.start != self.rows || done.is_empty() {
+                    break;
+                }
+                let block = [block];
+                let thrown = Coupling::part(&block);
+                beam::add(&thrown, (coupling, elements), sun, shape, scratch.direct, &mut images);
+                self.rays += thrown.rows(done.clone()).map(|(_, r)| r.row.all_rays()).sum::<u64>();
+                self.rows = done.end;
+            }
+            if self.rows == first {
+                if lanes == 1 {
+                    return Err(Error::BufferTooSmall { needed: size.saturating_mul(3), given: size }.into());
+                }
+                lanes = 1;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,178 @@
+//! From a coupling and a light to the record that views are computed from.
+
+use super::{Count, Executor};
+use crate::base::arena::{ALIGNMENT, Arena, Need};
+use crate::base::error::Error;
+use crate::coupling::element::Elements;
+use crate::coupling::{Coupling, sink};
+use crate::radiosity::accuracy::Own;
+use crate::radiosity::beam::{self, BeamSettings};
+use crate::radiosity::direct::{self, Shape};
+use crate::radiosity::limits;
+use crate::radiosity::solution::{Solution, SolutionMemory, SolutionSize};
+use crate::radiosity::solver;
+use crate::radiosity::sun_image;
+use crate::rays::bvh::Bvh;
+use crate::scene::Scene;
+use crate::scene::light::Light;
+use crate::settings::{self, Settings};
+
+/// Share of the progress that each stage takes: the sky's light, the sun's, the sweeps' bounds, gathering.
+pub(super) const SHARES: [f64; 4] = [0.3, 0.3, 0.2, 0.2];
+
+/// A scene and its coupling under a light that is to be solved for.
+#[derive(Clone, Copy, Debug)]
+pub struct Lighting<'a> {
+    /// The scene.
+    pub scene: &'a Scene<'a>,
+    /// Its tree.
+    pub bvh: &'a Bvh<'a>,
+    /// Its elements.
+    pub elements: &'a Elements<'a>,
+    /// Its coupling.
+    pub coupling: &'a Coupling<'a>,
+    /// The light.
+    pub light: &'a Light<'a>,
+    /// By which the coupling was made.
+    pub settings: &'a Settings,
+}
+
+/// Counts of the values that a light's stages work on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sizes {
+    /// The solution's.
+    pub solution: SolutionSize,
+    /// Radiances of all unknowns that are kept at once while solving.
+    orders: usize,
+    /// Bytes of a few rows of beams.
+    beams: usize,
+}
+
+/// Memory of a light's stages beside the solution's, from [`Sizes::scratch`].
+#[derive(Debug)]
+pub struct Scratch<'m> {
+    /// Direct irradiance, of the solution's shape.
+    pub(super) direct: &'m mut [f64],
+    pub(super) orders: &'m mut [f64],
+    pub(super) own: &'m mut [Own],
+    pub(super) carried: &'m mut [f32],
+}
+
+/// How a scene's mirrors throw a light's sun; `None` where there are no such beams.
+pub(super) fn beam_settings(
+    scene: &Scene<'_>,
+    light: &Light<'_>,
+    settings: &Settings,
+) -> Option<BeamSettings> {
+    let sun = light.sun.as_ref()?;
+    settings::beams(scene, sun, settings.image_tolerance, settings.max_bounces, settings.all_irradiances)
+}
+
+impl Sizes {
+    /// Those of a scene under a light.
+    pub fn new(
+        scene: &Scene<'_>,
+        elements: &Elements<'_>,
+        light: &Light<'_>,
+        settings: &Settings,
+    ) -> Result<Sizes, Error> {
+        let Settings { tolerance, max_bounces, .. } = *settings;
+        let shape = settings::shape(max_bounces, scene.bands());
+        let (mut beams, mut places) = (0, 0);
+        if let Some(settings) = beam_settings(scene, light, settings) {
+            beams = sink::bytes(16, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
+            places = sun_image::places(elements.facet_sides());
+        }
+        let sweeps = || 2 + solver::kept(scene, tolerance, max_bounces);
+        Ok(Sizes {
+            solution: SolutionSize { shape, unknowns: elements.unknowns(), places },
+            orders: if shape.levels == 1 { sweeps() } else { shape.levels + 1 },
+            beams,
+        })
+    }
+
+    /// Bytes of [`Scratch`].
+    pub fn scratch(&self) -> Need {
+        let values = self.solution.values();
+        Need::new()
+            .and::<f64>(self.solution.table())
+            .and::<f64>(values * self.orders)
+            .and::<Own>(values)
+            .and::<f32>(2 * values)
+    }
+
+    /// Carves the scratch memory out of an arena.
+    pub fn take_scratch<'m>(&self, arena: &mut Arena<'m>) -> Result<Scratch<'m>, Error> {
+        let values = self.solution.values();
+        Ok(Scratch {
+            direct: arena.take(self.solution.table())?,
+            orders: arena.take(values * self.orders)?,
+            own: arena.take(values)?,
+            carried: arena.take(2 * values)?,
+        })
+    }
+
+    /// Bytes with which beams can begin on so many lanes; 0 where there are none.
+    pub fn beams(&self, lanes: usize) -> usize {
+        if self.beams == 0 { 0 } else { self.beams.saturating_mul(4 * lanes.max(1) - 3) + ALIGNMENT }
+    }
+
+    /// Shape of the irradiance table.
+    pub fn shape(&self) -> Shape {
+        self.solution.shape
+    }
+}
+
+impl Lighting<'_> {
+    /// Direct light but for beams, and the reference radiance: that `given`, or from the light. Returns the rays toward the
+    /// sun.
+    ///
+    /// # Errors
+    /// Radiances above 1e37 ([`limits::check_highlights`]).
+    pub fn direct<X: Executor>(
+        &self,
+        given: Option<&[f64]>,
+        memory: &mut SolutionMemory<'_>,
+        scratch: &mut Scratch<'_>,
+        run: &mut X,
+    ) -> Result<u64, X::Error> {
+        let Lighting { scene, bvh, elements, coupling, light, settings } = *self;
+        limits::check_highlights(scene, light)?;
+        match given {
+            Some(given) => memory.reference.iter_mut().zip(given).for_each(|(to, from)| *to = *from),
+            None => light.reference_radiance(scene, memory.reference),
+        }
+        let shape = settings::shape(settings.max_bounces, scene.bands());
+        match &light.sky {
+            None => scratch.direct.fill(0.0),
+            Some(sky) => {
+                let accuracy = settings::sky_accuracy(settings.image_tolerance);
+                run.rows(scratch.direct, shape.stride(), SHARES[0], |range, out| {
+                    direct::sky_rows(scene, elements, coupling, sky, accuracy, range, shape, out)
+                })?;
+            }
+        }
+        let Some(sun) = &light.sun else {
+            memory.sun.fill(0.0);
+            return Ok(0);
+        };
+        let Count(rays) = run.rows(memory.sun, 1, 0.5 * SHARES[1], |range, out| {
+            direct::sun_rows(scene, bvh, elements, coupling, sun, range, out).map(Count)
+        })?;
+        Ok(rays)
+    }
+
+    /// The diffuse solution from the direct light, of which `sun_rays` rays were traced.
+    ///
+    /// # Errors
+    /// A system that diverges; radiances above 1e37 ([`limits::check_radiance`]).
+    pub fn solve<'m, X: Executor>(
+        &self,
+        memory: SolutionMemory<'m>,
+        scratch: &mut Scratch<'_>,
+        sun_rays: u64,
+        run: &mut X,
+    ) -> Result<Solution<'m>, X::Error> {
+        super::solve::solve(self, memory, scratch, sun_rays, run)
+    }
+}

@@ -1,0 +1,251 @@
+//! The linear system's solution: sweeps to the end, twice where elements' gradients add to what they send, and its errors.
+
+use super::light::{Lighting, SHARES, Scratch};
+use super::{Executor, Largest};
+use crate::base::index::{Index, IndexMut};
+use crate::radiosity::System;
+use crate::radiosity::accuracy::{self, Own};
+use crate::radiosity::direct;
+use crate::radiosity::limits;
+use crate::radiosity::solution::{Numbers, Solution, SolutionMemory};
+use crate::radiosity::solver::{History, Solver};
+use crate::radiosity::sun_image::SunImages;
+use crate::settings::Settings;
+use core::ops::Range;
+
+/// As [`Lighting::solve`].
+pub(super) fn solve<'m, X: Executor>(
+    of: &Lighting<'_>,
+    memory: SolutionMemory<'m>,
+    scratch: &mut Scratch<'_>,
+    sun_rays: u64,
+    run: &mut X,
+) -> Result<Solution<'m>, X::Error> {
+    let Lighting { scene, elements, coupling, light, settings, .. } = *of;
+    let SolutionMemory { reference, irradiance, sun, slots, thrown, variance } = memory;
+    let (reference, sun, images) = (&*reference, &*sun, SunImages { slots, thrown });
+    let shape = crate::settings::shape(settings.max_bounces, scene.bands());
+    let Scratch { direct, orders, own, carried } = scratch;
+    let size = elements.unknowns() * shape.bands;
+    let system = System { scene, elements, coupling, light, direct: &[], sun, shape };
+    let (mut before, mut bounds) = (0, None);
+    if shape.levels == 1 {
+        let first = Solve { system: System { direct, ..system }, settings, reference };
+        before = first.run(orders, irradiance, &mut bounds, run)?.map_or(0, |s| s.done);
+        let missed = orders.part_mut(size..2 * size);
+        run.rows(missed, shape.bands, 0.0, |range, out| {
+            system.slopes(range, irradiance, out);
+            Ok(())
+        })?;
+        direct::add(missed, shape, direct);
+    }
+    let last = Solve { system: System { direct, ..system }, settings, reference };
+    let sweeps = last.run(orders, irradiance, &mut bounds, run)?;
+    let at = if shape.levels == 1 { 0 } else { shape.levels };
+    let radiance = orders.part(at * size..(at + 1) * size);
+    limits::check_radiance(radiance, shape.bands)?;
+    images.take_off(shape, elements.facet_sides(), |unknown| elements.facet_side(unknown), irradiance);
+    system.extend(irradiance);
+    errors(&system, radiance, reference, (own, carried), variance, run)?;
+    Ok(Solution {
+        shape,
+        reference,
+        irradiance,
+        sun,
+        images,
+        variance,
+        numbers: Numbers {
+            brightest: limits::brightest(scene, light, reference, radiance),
+            solver: sweeps.map_or(0.0, |s| s.error),
+            sweeps: sweeps.map_or(shape.levels as u64, |s| u64::from(before + s.done)),
+            sun_rays,
+        },
+    })
+}
+
+/// Expected squared error of each unknown; `own` and `carried` hold one and two values of each and of each band.
+fn errors<X: Executor>(
+    system: &System<'_>,
+    radiance: &[f64],
+    reference: &[f64],
+    (own, carried): (&mut [Own], &mut [f32]),
+    out: &mut [f32],
+    run: &mut X,
+) -> Result<(), X::Error> {
+    let bands = system.shape.bands;
+    let (mut carried, mut next) = carried.split_at_mut(own.len().min(carried.len()));
+    run.rows(own, bands, 0.0, |range, out| accuracy::differences(system, radiance, reference, range, out))?;
+    let own = &*own;
+    for number in 0..accuracy::carried(system.scene) {
+        let from = if number > 0 { &*carried } else { &[] };
+        run.rows(next, bands, 0.0, |range, out| accuracy::carry(system, own, from, range, out))?;
+        core::mem::swap(&mut carried, &mut next);
+    }
+    run.rows(out, 1, 0.0, |range, out| accuracy::rows(system, own, carried, range, out))
+}
+
+/// Bounds on the error of a sweep, for any light.
+#[derive(Clone, Copy)]
+struct Bounds {
+    /// The contraction of a sweep.
+    q: f64,
+    /// The bound on the inverse, where the contraction gives none.
+    inverse: Option<f64>,
+}
+
+/// The linear system at work.
+struct Solve<'a> {
+    system: System<'a>,
+    settings: &'a Settings,
+    reference: &'a [f64],
+}
+
+impl Solve<'_> {
+    /// Fills the table of irradiances, the second time from the radiances before, which stand first of all `orders` (last
+    /// where orders of reflection are kept apart). Returns how the sweeps went; none of orders kept apart.
+    fn run<X: Executor>(
+        &self,
+        orders: &mut [f64],
+        irradiance: &mut [f64],
+        bounds: &mut Option<Bounds>,
+        run: &mut X,
+    ) -> Result<Option<Solver>, X::Error> {
+        let shape = self.system.shape;
+        let size = self.system.elements.unknowns() * shape.bands;
+        if shape.levels > 1 {
+            self.orders(orders, size, irradiance, run)?;
+            return Ok(None);
+        }
+        let (from, rest) = split(orders, size);
+        let (to, history) = split(rest, size);
+        let sweeps = self.converge([&mut *from, to], history, bounds, run)?;
+        let radiance = &*from;
+        run.rows(irradiance, shape.stride(), SHARES[3], |range, out| {
+            self.system.gather(range, 0, |_| radiance, out)
+        })?;
+        Ok(Some(sweeps))
+    }
+
+    /// The radiances before any reflection.
+    fn start<X: Executor>(&self, radiance: &mut [f64], run: &mut X) -> Result<(), X::Error> {
+        run.rows(radiance, self.system.shape.bands, 0.0, |range, out| {
+            self.system.start(range, out);
+            Ok(())
+        })
+    }
+
+    /// Sweeps until the solution, which then stands in the first of both, is good enough.
+    fn converge<X: Executor>(
+        &self,
+        [from, to]: [&mut [f64]; 2],
+        history: &mut [f64],
+        bounds: &mut Option<Bounds>,
+        run: &mut X,
+    ) -> Result<Solver, X::Error> {
+        let Settings { tolerance, max_bounces, .. } = *self.settings;
+        let (known, mut before) = (bounds.is_some(), 0);
+        let Bounds { q, inverse } = match bounds {
+            Some(bounds) => *bounds,
+            None => {
+                let (found, sweeps) = self.bounds([&mut *from, &mut *to], history, run)?;
+                before = sweeps;
+                *bounds.insert(found)
+            }
+        };
+        // a sweep from a solution adds a reflection to all that it has
+        if !known || max_bounces.is_some() {
+            self.start(from, run)?;
+        }
+        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
+        let ends =
+            self.iterate(&mut solver, [&mut *from, &mut *to], history, run, |range, from, to, relax| {
+                self.system.relaxed_sweep(range, from, to, self.reference, relax)
+            })?;
+        solver.finish(ends[0], self.reference, max_bounces);
+        if solver.done % 2 == 1 {
+            from.iter_mut().zip(to).for_each(|(from, to)| *from = *to);
+        }
+        solver.done += before;
+        Ok(solver)
+    }
+
+    /// The bounds, and the sweeps that finding them took.
+    fn bounds<X: Executor>(
+        &self,
+        [from, to]: [&mut [f64]; 2],
+        history: &mut [f64],
+        run: &mut X,
+    ) -> Result<(Bounds, u32), X::Error> {
+        let bands = self.system.shape.bands;
+        let Largest(q) =
+            run.rows(to, bands, SHARES[2], |range, _| Ok(Largest(self.system.contraction(range))))?;
+        let deficits = from.len().min(history.len());
+        run.rows(history.head_mut(deficits), bands, 0.0, |range, out| {
+            self.system.deficits(range, out);
+            Ok(())
+        })?;
+        if !Solver::is_closed(q, self.settings.max_bounces) {
+            return Ok((Bounds { q, inverse: None }, 0));
+        }
+        from.fill(0.0);
+        let mut unit = Solver::unit();
+        let ends = self.iterate(&mut unit, [from, to], history, run, |range, from, to, relax| {
+            self.system.unit_sweep(range, from, to, relax)
+        })?;
+        Ok((Bounds { q, inverse: Some(unit.inverse(ends[1], q)?) }, unit.done))
+    }
+
+    /// Iterates to the end: the latest solution, and the one before.
+    fn iterate<'o, X: Executor>(
+        &self,
+        solver: &mut Solver,
+        [mut latest, mut next]: [&'o mut [f64]; 2],
+        history: &mut [f64],
+        run: &mut X,
+        sweep: impl Fn(Range<usize>, &[f64], &mut [f64], f64) -> f64 + Sync,
+    ) -> Result<[&'o [f64]; 2], X::Error> {
+        let bands = self.system.shape.bands;
+        let mut history = History::new(history, latest.len());
+        while solver.more() {
+            let (seen, relaxation) = (&*latest, solver.relaxation());
+            let Largest(change) =
+                run.rows(next, bands, 0.0, |range, out| Ok(Largest(sweep(range, seen, out, relaxation))))?;
+            core::mem::swap(&mut latest, &mut next);
+            if solver.took(change) {
+                history.note(next, latest, bands, |at| self.system.weight(at));
+            }
+        }
+        Ok([latest, next])
+    }
+
+    /// Each order of reflection from those before it.
+    fn orders<X: Executor>(
+        &self,
+        orders: &mut [f64],
+        size: usize,
+        irradiance: &mut [f64],
+        run: &mut X,
+    ) -> Result<(), X::Error> {
+        let shape = self.system.shape;
+        let share = (SHARES[2] + SHARES[3]) / shape.levels as f64;
+        self.start(orders.head_mut(size), run)?;
+        for level in 0..shape.levels {
+            let (done, rest) = split(orders, size * (level + 1));
+            let order = |at: usize| done.part(at * size..(at + 1) * size);
+            run.rows(irradiance, shape.stride(), share, |range, out| {
+                self.system.gather(range, level, order, out)
+            })?;
+            let table = &*irradiance;
+            run.rows(rest.head_mut(size), shape.bands, 0.0, |range, out| {
+                self.system.reflect(range, level, table, out);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// As `split_at_mut`, without a way to panic.
+fn split<T>(values: &mut [T], at: usize) -> (&mut [T], &mut [T]) {
+    values.split_at_mut(at.min(values.len()))
+}
