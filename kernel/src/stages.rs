@@ -12,6 +12,7 @@ pub use beams::Beams;
 pub use light::{Lighting, Scratch, Sizes};
 
 use crate::base::error::Error;
+use core::num::NonZeroUsize;
 use core::ops::Range;
 
 /// Runs the ranges of a stage, one after the other or at once.
@@ -40,10 +41,11 @@ pub trait Executor {
         share: f64,
         work: impl Fn(Range<usize>, &mut [T]) -> Result<R, Error> + Sync,
     ) -> Result<R, Self::Error> {
-        let stride = stride.max(1);
+        // a divisor that needs no check
+        let stride = NonZeroUsize::new(stride).unwrap_or(NonZeroUsize::MIN);
         let rows = (out.len() / stride).div_ceil((RANGES_PER_LANE * self.lanes()).max(1));
         let rows = rows.clamp(RANGE_ROWS.0, RANGE_ROWS.1);
-        self.pieces(out, rows * stride, share, |number, part| {
+        self.pieces(out, rows * stride.get(), share, |number, part| {
             work(number * rows..number * rows + part.len() / stride, part)
         })
     }
