@@ -43,8 +43,8 @@ pub fn point(triangle: &[Vec3; 3], u: f64, v: f64) -> Vec3 {
 pub struct Path(pub u32);
 
 impl Path {
-    /// The most steps.
-    pub const DEEPEST: u32 = 8;
+    /// The most steps: a facet's sides over its smallest elements', 4096. Four bits of a path count them and each has two.
+    pub const DEEPEST: u32 = 12;
 
     /// Steps taken.
     #[inline(always)]
@@ -119,6 +119,6 @@ mod tests {
         assert!(!path.is_quarter_beside(Path::default().step(1).step(2).step(2)));
         assert!(!beside.step(1).is_quarter_beside(path) && !Path::default().is_quarter_beside(path));
         let deepest = (0..Path::DEEPEST).fold(Path::default(), |p, k| p.step(k as usize));
-        assert_eq!((deepest.depth(), deepest.share()), (8, 1.0 / 65536.0));
+        assert_eq!((deepest.depth(), deepest.share()), (12, 1.0 / (1u64 << 24) as f64));
     }
 }
