@@ -48,7 +48,7 @@ pub struct Settings {
     pub tolerance: f64,
     /// 1e-6 to 0.1. Where it is less than the tolerance, that is the solution's alone, and this the image's: rays from the
     /// points that it shows find what a solution lacks that is there sooner. For few images of little error, which take longer
-    /// each; `None`: the tolerance. There are no such rays where reflections are counted, or where lobes or curved mirrors
+    /// each; `None`: the tolerance. There are no such rays where lobes or curved mirrors
     /// throw sunlight; the error estimate tells.
     pub image_tolerance: Option<f64>,
     /// Light reflected more often does not count; `None`: by tolerance.

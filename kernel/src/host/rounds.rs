@@ -2,7 +2,6 @@
 
 use super::{Rays, Report, Seconds, Settings};
 use crate::rounds::{self, Round};
-use crate::settings;
 use crate::view::estimate::Limit;
 
 /// The rounds of one image. Each computes geometry, light and image by [`Rounds::settings`], and asks
@@ -52,10 +51,6 @@ impl Rounds {
 
     /// What the present round is to be computed by: `settings` but for their tolerances.
     pub fn settings(&mut self, settings: Settings) -> Settings {
-        if self.done == 0 && settings::shape(settings.max_bounces, 1).levels > 1 {
-            // no rays from points, which would mend a coarse solution
-            self.tolerance = self.asked;
-        }
         Settings { tolerance: self.tolerance, image_tolerance: Some(self.asked), ..settings }
     }
 

@@ -8,7 +8,7 @@ mod sunlight;
 
 use crowd::{CROWDED, Surroundings};
 pub(crate) use gather::GATHERS;
-use gather::{Gathered, Spot};
+use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
 
 use crate::base::arena::plain_table;
@@ -287,6 +287,10 @@ struct Leg<'w> {
     images: &'w mut [[f64; MAX_BANDS]; 2],
     /// For rays from a point; none where it is such a ray itself.
     gathered: Option<&'w mut Gathered>,
+    /// Length of its latest ray.
+    step: f64,
+    /// For rays from a point: where they go on diffusely.
+    onward: Option<Onward<'w>>,
 }
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
@@ -407,6 +411,8 @@ impl Solved<'_> {
             sunless,
             images,
             gathered,
+            step: 0.0,
+            onward: None,
         };
         let how = &mut How { sample, outlook, branches: true };
         if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
@@ -434,6 +440,7 @@ impl Solved<'_> {
             };
             path.object |= leg.mirrors == 0;
             leg.far += met.t;
+            leg.step = met.t;
             let surface = Surface::of_hit(self.scene, &met)?;
             self.add_diffuse(leg, &surface, how, terms, path);
             let mirror = surface.mirror(self.scene)?;
@@ -642,6 +649,17 @@ impl Solved<'_> {
         if !self.images.slots.is_empty() {
             self.add_images(leg, surface, how, to, path);
         }
+        if self.goes_on(leg, surface, unknown, how.sample) {
+            if sunlit > 0.0
+                && let Some(sun) = &self.light.sun
+            {
+                let own = to.iter_mut().zip(leg.through.iter()).zip(diffuse);
+                own.enumerate().for_each(|(band, ((to, through), rho))| {
+                    *to += through * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
+                });
+            }
+            return;
+        }
         let mut weight = 0.0;
         for (through, rho) in leg.through.iter().zip(diffuse) {
             weight = f64::max(weight, through * rho);
@@ -656,7 +674,7 @@ impl Solved<'_> {
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {
-            let spot = Spot { surface, unknown, values, local, weight };
+            let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors };
             if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
                 (correction, variance) = (near, left);
             }

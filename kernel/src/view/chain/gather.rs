@@ -5,6 +5,9 @@
 //! sets, each as large as all before, until their parts agree. Error of n rays whose light has the standard
 //! deviation s: about s n^-3/4. Where facets hide little of the sky, its irradiance is the exact one of the plane less what
 //! they hide.
+//!
+//! Where a ray is short beside the element that it meets, the element's linear function says nothing of light there: beside
+//! contact lines, where a body is pierced by another. The ray goes on diffusely from there, as paths do, until it is not.
 
 use super::{How, Leg, Path, Sample, Solved, Surroundings, Terms, linear};
 use crate::base::arena::plain_table;
@@ -12,6 +15,7 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::math::{PI, Vec3, clamp, frame, pow, sqrt};
 use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::coupling::element::Local;
+use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
 use crate::scene::MAX_BANDS;
 
@@ -42,6 +46,12 @@ const DOUBT: f64 = 3.0;
 /// elements err together.
 const ALIKE: f64 = 2.0;
 
+/// Rays go on diffusely from elements whose root of the area is more than this share of the ray.
+const SHORT: f64 = 1.0;
+
+/// The most times that a ray goes on: in a corner half of the light does each time.
+const MOST_ONWARD: u32 = 8;
+
 /// Elements of one pixel whose corrections are kept.
 const KEPT: usize = if GATHERS { 8 } else { 0 };
 
@@ -52,6 +62,8 @@ plain_table! {
         pub terms: [Terms; GATHERS as usize],
         /// Product of the reflectances along it.
         pub through: [[f64; MAX_BANDS]; GATHERS as usize],
+        /// The same from where it goes on diffusely.
+        pub onward: [[f64; MAX_BANDS]; GATHERS as usize],
         /// The sky in its direction.
         pub sky: [f64; BANDS],
         /// Sums over the rays of each part: what they bring beyond the sky that they would see were nothing in their way.
@@ -78,6 +90,7 @@ impl Gathered {
     pub const ZERO: Gathered = Gathered {
         terms: [Terms::ZERO; GATHERS as usize],
         through: [[0.0; MAX_BANDS]; GATHERS as usize],
+        onward: [[0.0; MAX_BANDS]; GATHERS as usize],
         sky: [0.0; BANDS],
         beyond: [[0.0; BANDS]; PARTS],
         open: [[0.0; BANDS]; PARTS],
@@ -150,6 +163,18 @@ pub(super) fn usual_rays(tolerance: f64) -> f64 {
     pow(0.8 / tolerance, 4.0 / 3.0)
 }
 
+/// Where a ray from a point goes on diffusely.
+pub(super) struct Onward<'w> {
+    /// Product of the reflectances up to there.
+    throughput: &'w mut [f64; MAX_BANDS],
+    /// The next ray, once it is known.
+    ray: Option<Ray>,
+    /// Reflections before it.
+    bounces: u32,
+    /// How often it went on before.
+    depth: u32,
+}
+
 /// The point of which is asked what arrives there.
 pub(super) struct Spot<'a> {
     pub surface: &'a Surface,
@@ -159,12 +184,13 @@ pub(super) struct Spot<'a> {
     pub local: Local,
     /// What a radiance of 1 brings to the image.
     pub weight: f64,
+    /// Reflections between it and the eye.
+    pub bounces: u32,
 }
 
 impl Solved<'_> {
     /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
-    /// holds: not what lobes and curved mirrors throw of the sun, nor flat ones where there are too many, nor what is
-    /// reflected a limited number of times.
+    /// holds: not what lobes and curved mirrors throw of the sun, nor flat ones where there are too many.
     #[inline]
     pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
         let most = self.settings.gather * self.settings.tolerance;
@@ -176,7 +202,7 @@ impl Solved<'_> {
     /// Whether any point may want rays.
     #[inline]
     pub(crate) fn gathers(&self) -> bool {
-        GATHERS && self.shape.levels == 1
+        GATHERS
     }
 
     fn knows_images(&self, surface: &Surface) -> bool {
@@ -252,7 +278,7 @@ impl Solved<'_> {
                 let part = (u64::from(index) * PARTS as u64 / u64::from(rays)) as usize;
                 let sample = Sample::OneOf { seed, index };
                 let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
-                self.add_direction((spot.surface, direction), part, images, gathered, &mut how, path)?;
+                self.add_direction((spot, direction), part, images, gathered, &mut how, path)?;
             }
             let [exact, plain] = [true, false].map(|exact| gathered.error(self.reference, rays, exact));
             if exact.min(plain) <= goal || 2 * rays > most {
@@ -266,7 +292,7 @@ impl Solved<'_> {
     /// One more ray from a point.
     fn add_direction(
         &self,
-        (surface, direction): (&Surface, Vec3),
+        (spot, direction): (&Spot<'_>, Vec3),
         part: usize,
         images: &mut [[f64; MAX_BANDS]; 2],
         gathered: &mut Gathered,
@@ -274,11 +300,11 @@ impl Solved<'_> {
         path: &mut Path,
     ) -> Option<()> {
         let bands = self.shape.bands;
-        let ray = surface.leave(direction);
-        let hit = self.bvh.closest(&ray);
+        let ray = spot.surface.leave(direction);
+        let mut hit = self.bvh.closest(&ray);
         path.rays += 1;
-        let Gathered { terms, through, sky, beyond, open, carried, .. } = gathered;
-        let (terms, through) = (terms.first_mut()?, through.first_mut()?);
+        let Gathered { terms, through, onward, sky, beyond, open, carried, .. } = gathered;
+        let (terms, through, throughput) = (terms.first_mut()?, through.first_mut()?, onward.first_mut()?);
         let (beyond, open) = (beyond.get_mut(part)?, open.get_mut(part)?);
         if let Some(light) = &self.light.sky {
             light.radiance(direction, sky.head_mut(bands));
@@ -292,22 +318,64 @@ impl Solved<'_> {
         let mut leg = Leg {
             ray,
             through,
-            mirrors: 0,
+            mirrors: spot.bounces + 1,
             lobes: 0,
             lobe: false,
             far: 0.0,
             sunless: true,
             images,
             gathered: None,
+            step: 0.0,
+            onward: Some(Onward { throughput, ray: None, bounces: 0, depth: 0 }),
         };
         let mut inner = Path::default();
-        self.follow(&mut leg, hit, how, terms, &mut inner);
+        loop {
+            self.follow(&mut leg, hit, how, terms, &mut inner);
+            let Some(onward) = leg.onward.as_mut() else { break };
+            let Some(ray) = onward.ray.take() else { break };
+            core::mem::swap(&mut leg.through, &mut onward.throughput);
+            (leg.ray, leg.mirrors, leg.lobes, leg.lobe) = (ray, onward.bounces, 0, false);
+            onward.depth += 1;
+            inner.rays += 1;
+            hit = self.bvh.closest(&ray);
+        }
         path.rays += inner.rays;
         *carried += sqrt(inner.variance);
         for (band, (sum, sky)) in beyond.iter_mut().zip(&*sky).enumerate().take(bands) {
             *sum += terms.sum(band) - *sky;
         }
         Some(())
+    }
+
+    /// Whether a ray from a point goes on diffusely from the surface that it has met, as it is short beside the element
+    /// there: then the next ray is noted.
+    pub(super) fn goes_on(
+        &self,
+        leg: &mut Leg<'_>,
+        surface: &Surface,
+        unknown: usize,
+        sample: Sample,
+    ) -> bool {
+        let (Some(onward), Sample::OneOf { seed, index }) = (&mut leg.onward, sample) else { return false };
+        let area = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
+        if onward.ray.is_some() || onward.depth >= MOST_ONWARD || leg.step * leg.step > SHORT * SHORT * area {
+            return false;
+        }
+        // the first along with the ray's own direction, coordinates 0 and 1; lobes have taken these
+        let (u, v) = if onward.depth == 0 && leg.lobes == 0 {
+            Sequence::new(seed).pair(index, 4)
+        } else {
+            Sequence::new(hash2(seed, 0x0d1f_f000 + onward.depth))
+                .pair(hash2(index, onward.depth) & 0xffff, 0)
+        };
+        let (x, y) = frame(surface.normal);
+        let (a, b, c) = cosine_direction(u, v);
+        onward.ray = Some(surface.leave(x * a + y * b + surface.normal * c));
+        onward.bounces = leg.mirrors + 1;
+        let diffuse = self.scene.diffuse(surface.material);
+        let own = onward.throughput.iter_mut().zip(leg.through.iter()).zip(diffuse);
+        own.for_each(|((next, through), rho)| *next = through * rho);
+        true
     }
 
     /// Notes the correction that rays from a point tell, and returns the expected squared error that is left.
