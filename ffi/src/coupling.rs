@@ -1,22 +1,20 @@
 //! The coupling: extended form factors between the elements of a scene, and what a new light needs instead of rays.
 
 use crate::memory::*;
-use crate::run::{MOST_LANES, Runner, Start, Turns, blik_run};
+use crate::run::{Runner, blik_run};
 use crate::scene::blik_scene;
 use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
 use blik_kernel::arena::ALIGNMENT;
-use blik_kernel::coupling::pack::{move_down, pack};
-use blik_kernel::coupling::rows::{RowSettings, fill};
-use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN, sink};
+use blik_kernel::coupling::rows::RowSettings;
+use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN};
 use blik_kernel::element::Elements;
 use blik_kernel::facing::Facing;
-use blik_kernel::stages::{Executor, block_rows as piece};
+use blik_kernel::stages::{self, BlockPlace, CouplingRows};
 use blik_kernel::subdivide::{self, Cut};
 use blik_kernel::{Error, settings};
 use core::ffi::c_void;
-use core::ops::Range;
 
 /// A coupling in memory. Read-only once made: any number of threads may use it at once.
 pub struct blik_coupling {
@@ -129,9 +127,6 @@ pub struct blik_coupling_info {
     pub bytes: usize,
 }
 
-/// Share of the progress that elements take.
-const PROBING: f64 = 0.1;
-
 /// Cuts a block of `size` bytes, of alignment 64, off the front of what is left.
 struct Cutter {
     start: *mut u8,
@@ -186,18 +181,9 @@ fn cut<'s>(
     runner: &mut Runner,
     scratch: &'s mut [u8],
 ) -> Result<Cut<'s>, blik_error> {
-    let tolerance = settings.asked.tolerance;
-    let mut cut = Cut::new(&base.scene, tolerance, scratch)?;
-    let probing = settings::probing(&settings.rows(base));
-    loop {
-        let (work, unevenness) = cut.work();
-        runner.rows(unevenness, 1, PROBING, |range, out| {
-            work.probe(&base.scene, &base.bvh, facing, (probing, tolerance), range, out).map(|_| ())
-        })?;
-        if !cut.refine(&base.scene) {
-            return Ok(cut);
-        }
-    }
+    let mut cut = Cut::new(&base.scene, settings.asked.tolerance, scratch)?;
+    stages::refine(&base.scene, &base.bvh, facing, &settings.asked, &mut cut, runner)?;
+    Ok(cut)
 }
 
 /// Makes the elements in the caller's memory.
@@ -223,180 +209,6 @@ fn elements(
     Ok(Elements::new(&base.scene, &cut, memory)?)
 }
 
-/// Where a finished block stands.
-#[derive(Clone, Copy, Debug, Default)]
-struct Spot {
-    first: usize,
-    rows: usize,
-    at: usize,
-    size: usize,
-}
-
-/// Fills all rows into the caller's memory: first each lane its share of rows in its share of the memory, then one
-/// after the other what did not fit; blocks are moved together after each round.
-struct Filler<'a> {
-    base: &'a blik_scene,
-    elements: &'a Elements<'static>,
-    facing: &'a Facing<'a>,
-    rows: &'a RowSettings,
-    /// Memory for the blocks.
-    start: Start<u8>,
-    size: usize,
-    /// The blocks so far.
-    spots: &'a mut [Spot],
-    used: usize,
-    end: usize,
-}
-
-impl Filler<'_> {
-    /// One lane's work: as many rows of `range` as `region` holds, which end up packed at its front.
-    fn lane(
-        &self,
-        range: Range<usize>,
-        region: Range<usize>,
-        note: &(dyn Fn(Spot) -> bool + Sync),
-    ) -> Result<(), Error> {
-        let bands = self.base.scene.bands();
-        let unmerged = settings::unmerged(self.rows);
-        let (mut next, mut at, mut records) = (range.start, region.start, 64);
-        while next < range.end {
-            let until = (next + piece(self.elements.unknowns())).min(range.end);
-            let wanted = sink::bytes(until - next, records, unmerged, bands)?.next_multiple_of(ALIGNMENT);
-            let size = wanted.min(region.end.saturating_sub(at));
-            // SAFETY: within this lane's region, which no other lane touches, behind its finished blocks.
-            let memory = unsafe { core::slice::from_raw_parts_mut(self.start.at(at), size) };
-            let done = match fill(
-                &self.base.scene,
-                &self.base.bvh,
-                self.elements,
-                self.facing,
-                self.rows,
-                next..until,
-                memory,
-            ) {
-                Ok(done) => done,
-                // the next round gives the rest more memory
-                Err(Error::BufferTooSmall { .. }) => return Ok(()),
-                Err(error) => return Err(error),
-            };
-            records = 64.max(Block::open(memory)?.records() / done.max(1) + 16);
-            let size = pack(memory)?.next_multiple_of(ALIGNMENT);
-            if !note(Spot { first: next, rows: done, at, size }) {
-                return Ok(());
-            }
-            (next, at) = (next + done, at + size);
-        }
-        Ok(())
-    }
-
-    /// The first gap in the rows that are done at or after `from`.
-    fn gap(&self, from: usize) -> Range<usize> {
-        let all = self.elements.unknowns();
-        let spots = || self.spots.iter().take(self.used);
-        let mut start = from;
-        while let Some(spot) = spots().find(|s| s.first <= start && start < s.first + s.rows) {
-            start = spot.first + spot.rows;
-        }
-        let end = spots().map(|s| s.first).filter(|first| *first >= start).min().unwrap_or(all);
-        start.min(all)..end.min(all)
-    }
-
-    /// One round with `lanes` lanes over one gap; true where it did any row.
-    fn round(
-        &mut self,
-        gap: Range<usize>,
-        lanes: usize,
-        share: f64,
-        runner: &mut Runner,
-    ) -> Result<bool, blik_error> {
-        let before = self.used;
-        let spots = Start(self.spots.as_mut_ptr());
-        let (room, most) = (Turns::new(self.used), self.spots.len());
-        let note = |spot: Spot| {
-            room.with(|used| {
-                if *used >= most {
-                    return false;
-                }
-                // SAFETY: within the spots, one thread at a time, each place once.
-                unsafe { spots.at(*used).write(spot) };
-                *used += 1;
-                true
-            })
-        };
-        let part = ((self.size - self.end) / lanes.max(1)) & !(ALIGNMENT - 1);
-        let this = &*self;
-        // every lane is one item, so that its region has one owner
-        runner.each(lanes, lanes, share, &|_, lane| {
-            let cut = |i: usize| gap.start + gap.len() * i / lanes.max(1);
-            let start = this.end + lane * part;
-            Ok(this.lane(cut(lane)..cut(lane + 1), start..start + part, &note)?)
-        })?;
-        self.used = room.into_inner();
-        let done = self.spots.get_mut(before..self.used).unwrap_or_default();
-        sort(done, |s| s.at);
-        for spot in done {
-            // SAFETY: all lanes have ended: the memory is this thread's alone.
-            let memory = unsafe { core::slice::from_raw_parts_mut(self.start.at(0), self.size) };
-            move_down(memory, spot.at, self.end, spot.size);
-            spot.at = self.end;
-            self.end += spot.size;
-        }
-        Ok(self.used > before)
-    }
-
-    /// All rounds.
-    fn run(&mut self, runner: &mut Runner) -> Result<(), blik_error> {
-        let all = self.elements.unknowns();
-        let lanes = runner.lanes().min(all.div_ceil(16)).max(1);
-        let left = 1.0 - PROBING;
-        let mut gap = 0..all;
-        if lanes > 1 {
-            self.round(gap, lanes, 0.9 * left, runner)?;
-            gap = self.gap(0);
-        }
-        while !gap.is_empty() {
-            let share = if lanes > 1 { 0.1 } else { 1.0 } * left * gap.len() as f64 / all as f64;
-            // one piece at a time, so that progress is told and a stop is heard
-            let next = gap.start..gap.end.min(gap.start + piece(all));
-            let own = share * next.len() as f64 / gap.len() as f64;
-            if !self.round(next, 1, own, runner)? {
-                return Err(self.short());
-            }
-            gap = self.gap(gap.start);
-        }
-        Ok(())
-    }
-
-    /// How much memory the rows done so far say that all need.
-    fn short(&self) -> blik_error {
-        let all = self.elements.unknowns();
-        let done: usize = self.spots.iter().take(self.used).map(|s| s.rows).sum();
-        let per_row = self.end.checked_div(done).unwrap_or(0);
-        let fixed = sink::bytes(1, 64, settings::unmerged(self.rows), self.base.scene.bands()).unwrap_or(0);
-        let needed = per_row.saturating_mul(all).saturating_add(per_row * (all - done) / 4);
-        let needed = needed.saturating_add(2 * fixed).max(self.size + fixed);
-        blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, self.size)
-    }
-}
-
-/// Insertion sort: the pieces come nearly in order, and are few.
-fn sort(spots: &mut [Spot], key: impl Fn(&Spot) -> usize) {
-    for end in 1..spots.len() {
-        for at in (1..=end).rev() {
-            let Some([a, b]) = spots.get_mut(at - 1..=at) else { break };
-            if key(a) <= key(b) {
-                break;
-            }
-            core::mem::swap(a, b);
-        }
-    }
-}
-
-/// The most blocks that `rows` rows are spread over.
-fn most_blocks(rows: usize) -> usize {
-    2 * rows.div_ceil(piece(rows)) + 8 + MOST_LANES.min(rows.div_ceil(16))
-}
-
 /// Bytes to begin with: elements, tables of blocks, one row while it grows.
 fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     let mut rows = settings.rows(base);
@@ -405,8 +217,8 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     }
     let unknowns =
         subdivide::most_elements(base.scene.facets(), settings.asked.tolerance) * base.scene.sides();
-    let row = sink::bytes(piece(unknowns), 64, settings::unmerged(&rows), base.scene.bands())?;
-    let table = most_blocks(unknowns) * (size_of::<Spot>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
+    let row = stages::least_bytes(&base.scene, &rows, unknowns)?;
+    let table = stages::places(unknowns) * (size_of::<BlockPlace>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
     let planes = Facing::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
     let parts = [head::<blik_coupling>(), element_bytes(base, settings.asked.tolerance)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
@@ -442,34 +254,23 @@ fn build(
     let planes = cutter.take_back(Facing::bytes(&base.scene, settings.planes(base))?)?;
     let facing = Facing::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
     let elements = elements(base, &facing, settings, runner, &mut cutter)?;
-    let mut rows = settings.asked.rows_within(&base.scene, elements.unknowns());
-    let most = most_blocks(elements.unknowns());
-    let spots = table(&mut cutter, most, Spot::default())?;
-    let room = (most * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
+    let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
+    let (bvh, scene) = (&base.bvh, &base.scene);
+    let rows = CouplingRows { scene, bvh, elements: &elements, facing: &facing, rows };
+    let places = table(&mut cutter, rows.places(), BlockPlace::default())?;
+    let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
     let size = cutter.size.saturating_sub(room);
-    let (used, end) = loop {
-        let (elements, rows_now) = (&elements, &rows);
-        let start = Start(cutter.start);
-        let (facing, spots) = (&facing, &mut *spots);
-        let mut filler =
-            Filler { base, elements, facing, rows: rows_now, start, size, spots, used: 0, end: 0 };
-        let Err(error) = filler.run(runner) else { break (filler.used, filler.end) };
-        if error.status != BLIK_ERROR_BUFFER_TOO_SMALL {
-            return Err(error);
+    let free = cutter.lend().get_mut(..size).unwrap_or_default();
+    let (places, end) = match rows.fill_in(free, places, settings.fit, runner) {
+        Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL => {
+            return Err(error.sizes(error.needed.saturating_add(given - size), given));
         }
-        match rows.fewer().filter(|_| settings.fit) {
-            Some(fewer) => rows = fewer,
-            None => return Err(error.sizes(error.needed.saturating_add(given - size), given)),
-        }
+        done => done?,
     };
-    let done = spots.get_mut(..used).unwrap_or_default();
-    sort(done, |s| s.first);
     let all: &'static [u8] = cutter.take(end)?;
-    let open = |spot: &Spot| Block::open(all.get(spot.at..spot.at + spot.size).unwrap_or_default());
-    let first = done.first().map(open).ok_or(blik_error::of(BLIK_ERROR_INTERNAL))??;
-    let blocks = table(&mut cutter, done.len(), first)?;
-    for (block, spot) in blocks.iter_mut().zip(&*done) {
-        *block = open(spot)?;
+    let blocks = table(&mut cutter, places.len(), Block::EMPTY)?;
+    for (block, place) in blocks.iter_mut().zip(places) {
+        *block = place.open(all)?;
     }
     let extent = cutter.start as usize - start;
     // SAFETY: `place` made room for it.
@@ -616,8 +417,8 @@ impl blik_coupling {
 #[cfg(feature = "std")]
 mod owned {
     use super::*;
+    use blik_kernel::stages::BlockMemory;
     use std::boxed::Box;
-    use std::sync::Mutex;
     use std::vec::Vec;
 
     /// Block by block, each lane as it goes.
@@ -637,17 +438,11 @@ mod owned {
         // SAFETY: the handle owns the slab.
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
         let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
-        let (unknowns, piece) = (elements.unknowns(), piece(elements.unknowns()));
-        let done = Mutex::new(Vec::new());
-        runner.each(unknowns.div_ceil(piece), runner.lanes(), 1.0 - PROBING, &|_, item| {
-            let range = item * piece..((item + 1) * piece).min(unknowns);
-            let slabs = piece_of(base, (&elements, &facing), &rows, range)?;
-            done.lock().map_err(|_| blik_error::of(BLIK_ERROR_INTERNAL))?.push((item, slabs));
-            Ok(())
-        })?;
-        let mut done = done.into_inner().map_err(|_| blik_error::of(BLIK_ERROR_INTERNAL))?;
-        done.sort_by_key(|(item, _)| *item);
-        let mut slabs: Vec<Slab> = done.into_iter().flat_map(|(_, slabs)| slabs).collect();
+        let (bvh, scene) = (&base.bvh, &base.scene);
+        let rows = CouplingRows { scene, bvh, elements: &elements, facing: &facing, rows };
+        let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
+        rows.fill(&mut pieces, runner)?;
+        let mut slabs: Vec<Slab> = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
         // SAFETY: the handle owns the slabs.
         let blocks =
             slabs.iter().map(|s| Block::open(unsafe { s.bytes() })).collect::<Result<Vec<_>, _>>()?;
@@ -656,8 +451,7 @@ mod owned {
         // SAFETY: the handle owns the slab.
         let (place, rest) = place::<blik_coupling>(unsafe { front.bytes_mut() })?;
         let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() };
-        let first = *blocks.first().ok_or(blik_error::of(BLIK_ERROR_INTERNAL))?;
-        let kept = table(&mut cutter, blocks.len(), first)?;
+        let kept = table(&mut cutter, blocks.len(), Block::EMPTY)?;
         kept.copy_from_slice(&blocks);
         slabs.extend([own, front]);
         let mut handle = blik_coupling::new(base, elements, kept, *settings);
@@ -667,32 +461,26 @@ mod owned {
         Ok(place.as_ptr())
     }
 
-    /// The rows of one range, in as many blocks as it takes.
-    fn piece_of(
-        base: &blik_scene,
-        (elements, facing): (&Elements<'_>, &Facing<'_>),
-        rows: &RowSettings,
-        range: Range<usize>,
-    ) -> Result<Vec<Slab>, blik_error> {
-        let mut slabs = Vec::new();
-        let (mut next, mut records, mut unmerged) = (range.start, 64, settings::unmerged(rows));
-        while next < range.end {
-            let bytes = sink::bytes(range.end - next, records, unmerged, base.scene.bands())?;
-            let mut slab = Slab::new(bytes)?;
-            // SAFETY: the slab is not moved while its bytes are in use.
-            let memory = unsafe { slab.bytes_mut() };
-            match fill(&base.scene, &base.bvh, elements, facing, rows, next..range.end, memory) {
-                Ok(done) => {
-                    next += done;
-                    records = 64.max(Block::open(memory)?.records() / done.max(1) + 16);
-                    let size = pack(memory)?;
-                    slab.shrink(size);
-                    slabs.push(slab);
-                }
-                Err(Error::BufferTooSmall { .. }) if unmerged < 1 << 28 => unmerged *= 4,
-                Err(error) => return Err(error.into()),
-            }
+    /// Memory of one piece's blocks, each of its own.
+    #[derive(Default)]
+    struct Slabs {
+        blocks: Vec<Slab>,
+        kept: usize,
+    }
+
+    impl BlockMemory for Slabs {
+        fn lend(&mut self, bytes: usize) -> Result<&mut [u8], Error> {
+            self.blocks.truncate(self.kept);
+            self.blocks.push(Slab::new(bytes).map_err(|_| Error::OutOfMemory { bytes })?);
+            // SAFETY: the bytes are lent until the next call, and the slab stays where it is until then.
+            Ok(self.blocks.last_mut().map(|slab| unsafe { slab.bytes_mut() }).unwrap_or_default())
         }
-        Ok(slabs)
+
+        fn keep(&mut self, bytes: usize) {
+            if let Some(slab) = self.blocks.last_mut() {
+                slab.shrink(bytes);
+            }
+            self.kept = self.blocks.len();
+        }
     }
 }

@@ -395,6 +395,7 @@ impl From<Error> for blik_error {
             Error::Mismatch { what: "coupling without directions" } => e::of(BLIK_ERROR_NOT_DIRECTIONAL),
             Error::Mismatch { .. } => e::of(BLIK_ERROR_HANDLE),
             Error::Diverges { row_sum } => e::of(BLIK_ERROR_DIVERGES).at(0, 0, row_sum),
+            Error::OutOfMemory { bytes } => e::of(BLIK_ERROR_MEMORY).sizes(bytes, 0),
             Error::Cancelled => e::of(BLIK_ERROR_CANCELLED),
             Error::Block => e::of(BLIK_ERROR_BLOCK),
             _ => e::of(BLIK_ERROR_INTERNAL),

@@ -10,7 +10,7 @@ mod run;
 
 pub use report::*;
 pub use rounds::Rounds;
-use run::Run;
+use run::{Progress, Run};
 
 use crate::base::arena::{Arena, Memory};
 use crate::base::error::Error;
@@ -18,9 +18,8 @@ use crate::base::math::Vec3;
 use crate::base::simd::Isa;
 use crate::coupling::element::Elements;
 use crate::coupling::facing::Facing;
-use crate::coupling::rows::fill;
 use crate::coupling::subdivide::Cut;
-use crate::coupling::{Block, Coupling, sink};
+use crate::coupling::{Block, Coupling};
 use crate::radiosity::direct::Shape;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize};
 use crate::radiosity::sun_image::SunImages;
@@ -30,7 +29,7 @@ use crate::scene::sky::{Sky, SkyInput};
 use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{Scene, SceneInput};
 use crate::settings;
-use crate::stages::{Beams, Executor, Lighting, Sizes, block_rows};
+use crate::stages::{self, Beams, BlockMemory, BlockPlace, CouplingRows, Executor, Lighting, Sizes};
 use crate::view::camera::{Camera, CameraInput};
 use crate::view::chain::Solved;
 use crate::view::facets;
@@ -38,6 +37,7 @@ use crate::view::image::{self, Tally, Target};
 use crate::view::signature::{self, Signature, Sums, View};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::atomic::AtomicUsize;
 use std::time::Instant;
 use std::vec::Vec;
 
@@ -63,6 +63,9 @@ pub struct Settings {
     /// The most first rays of all rows of the coupling; `None`: by tolerance. Fewer leave a larger error, which the estimate
     /// tells.
     pub ray_budget: Option<u64>,
+    /// The most bytes of the coupling's rows: rows have fewer rays where more would be needed, which leave a larger error.
+    /// `None`: as many as there are. Where the least rows do not fit, either, [`Error::BufferTooSmall`].
+    pub memory_budget: Option<usize>,
 }
 
 impl Default for Settings {
@@ -75,6 +78,7 @@ impl Default for Settings {
             all_irradiances: false,
             directional: true,
             ray_budget: None,
+            memory_budget: None,
         }
     }
 }
@@ -96,6 +100,7 @@ const MOST_BEAM_BYTES: usize = 1 << 34;
 pub struct Host {
     pool: rayon::ThreadPool,
     isa: Isa,
+    progress: Option<Progress>,
 }
 
 /// Memory of the stages that depend on the geometry alone; give the same one again to reuse it.
@@ -193,7 +198,15 @@ impl Host {
     pub fn new(threads: usize) -> Result<Host, Error> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|_| Error::TooMany { what: "threads", limit: threads })?;
-        Ok(Host { pool, isa: Isa::detect() })
+        Ok(Host { pool, isa: Isa::detect(), progress: None })
+    }
+
+    /// The same threads with a progress function: it is told the share, 0 to 1, that is done of a call of
+    /// [`Host::geometry`], [`Host::light`] or [`Host::image`], by one thread at a time. False stops the call, which then
+    /// returns [`Error::Cancelled`].
+    #[must_use]
+    pub fn with_progress(self, told: impl FnMut(f64) -> bool + Send + 'static) -> Host {
+        Host { progress: Some(Progress::new(told)), ..self }
     }
 
     /// Scene, tree, elements and coupling of a mesh.
@@ -203,7 +216,7 @@ impl Host {
         input: &SceneInput<'_>,
         settings: &Settings,
     ) -> Result<Geometry<'s>, Error> {
-        let reference = settings.reference_radiance.clone();
+        let (reference, memory_budget) = (settings.reference_radiance.clone(), settings.memory_budget);
         let settings = settings.checked()?;
         if let Some(reference) = &reference {
             light::check_reference(reference, input.bands)?;
@@ -228,26 +241,30 @@ impl Host {
         let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
         let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
         let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
-        let probing = settings::probing(&rows);
-        loop {
-            let (work, unevenness) = cut.work();
-            let probes = self.split(unevenness, 1, |range, out| {
-                work.probe(&scene, &bvh, &facing, (probing, settings.tolerance), range, out)
-            })?;
-            report.rays.visibility += probes.iter().sum::<u64>();
-            if !cut.refine(&scene) {
-                break;
-            }
-        }
+        let mut run = Run::new(self);
+        report.rays.visibility += stages::refine(&scene, &bvh, &facing, &settings, &mut cut, &mut run)?;
         *element_memory = Memory::new(Elements::bytes(&cut)?);
         let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
         let rows = settings.rows_within(&scene, elements.unknowns());
-        let unmerged = settings::unmerged(&rows);
-        *slabs = self.blocks(elements.unknowns(), unmerged, scene.bands(), |range, memory| {
-            fill(&scene, &bvh, &elements, &facing, &rows, range, memory)
-        })?;
-        let blocks = slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?;
+        let rows = CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, facing: &facing, rows };
+        let blocks = match memory_budget {
+            None => {
+                let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
+                rows.fill(&mut pieces, &mut run)?;
+                *slabs = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
+                slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?
+            }
+            Some(bytes) => {
+                let mut slab = Memory::new(bytes);
+                let mut places = std::vec![BlockPlace::default(); rows.places()];
+                let (places, end) = rows.fill_in(slab.bytes_mut(), &mut places, true, &mut run)?;
+                slab.truncate(end);
+                *slabs = std::vec![slab];
+                let memory = slabs.first().map_or(&[][..], Memory::bytes);
+                places.iter().map(|place| place.open(memory)).collect::<Result<Vec<_>, _>>()?
+            }
+        };
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
         let rays = coupling.rays();
         report.rays.visibility += rays;
@@ -256,26 +273,6 @@ impl Host {
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
         Ok(Geometry { scene, bvh, elements, blocks, settings, reference, rays, report })
-    }
-
-    /// Fills blocks with all `rows` rows, each of some `unmerged` records while it grows, in parallel.
-    fn blocks(
-        &self,
-        rows: usize,
-        unmerged: usize,
-        bands: usize,
-        fill: impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error> + Sync,
-    ) -> Result<Vec<Memory>, Error> {
-        let piece = block_rows(rows);
-        let pieces: Vec<Range<usize>> =
-            (0..rows).step_by(piece).map(|start| start..(start + piece).min(rows)).collect();
-        let filled = self.pool.install(|| {
-            pieces
-                .into_par_iter()
-                .map(|range| fill_piece(range, unmerged, bands, &fill))
-                .collect::<Result<Vec<_>, _>>()
-        })?;
-        Ok(filled.into_iter().flatten().collect())
     }
 
     /// The light of a scene, solved: no visibility is computed again.
@@ -339,23 +336,6 @@ impl Host {
         Ok(Lit { geometry, light, shape: sizes.shape(), tables, numbers, report })
     }
 
-    /// Runs `work` over ranges of rows, each with its part of `out` (`stride` values a row), in parallel.
-    fn split<T: Send, R: Send>(
-        &self,
-        out: &mut [T],
-        stride: usize,
-        work: impl Fn(Range<usize>, &mut [T]) -> Result<R, Error> + Sync,
-    ) -> Result<Vec<R>, Error> {
-        let rows = out.len() / stride.max(1);
-        let piece = rows.div_ceil(8 * self.pool.current_num_threads()).max(16);
-        self.pool.install(|| {
-            out.par_chunks_mut(piece * stride.max(1))
-                .enumerate()
-                .map(|(i, part)| work(i * piece..i * piece + part.len() / stride.max(1), part))
-                .collect()
-        })
-    }
-
     /// The image that a camera sees of a solved scene; with `components`, the terms of eq. (11) too.
     pub fn image(&self, lit: &Lit<'_>, camera: &CameraInput, components: bool) -> Result<Image, Error> {
         let camera = Camera::new(camera, &lit.geometry.scene)?;
@@ -396,9 +376,12 @@ impl Host {
             let components = parts.each_mut().map(|p| p.next().unwrap_or_default());
             jobs.push((i * piece..((i + 1) * piece).min(rows), Target { image, components }));
         }
+        let (run, finished, parts) = (Run::new(self), AtomicUsize::new(0), jobs.len());
         let tallies = self.pool.install(|| {
             let paint = |memory: &mut Memory, (range, mut target): (Range<usize>, Target<'_>)| {
-                image::rows(solved, camera, range, &mut target, memory.bytes_mut())
+                let tally = image::rows(solved, camera, range, &mut target, memory.bytes_mut())?;
+                run.tell(&finished, parts, 1.0)?;
+                Ok::<_, Error>(tally)
             };
             let memory = || Memory::new(scratch);
             jobs.into_par_iter().map_init(memory, paint).collect::<Result<Vec<_>, _>>()
@@ -560,32 +543,26 @@ impl Lit<'_> {
     }
 }
 
-/// Fills blocks with the rows of one range, as many blocks as it takes.
-fn fill_piece(
-    range: Range<usize>,
-    mut unmerged: usize,
-    bands: usize,
-    fill: &impl Fn(Range<usize>, &mut [u8]) -> Result<usize, Error>,
-) -> Result<Vec<Memory>, Error> {
-    let mut slabs = Vec::new();
-    let mut next = range.start;
-    let mut records = 64;
-    while next < range.end {
-        let mut slab = Memory::new(sink::bytes(range.end - next, records, unmerged, bands)?);
-        match fill(next..range.end, slab.bytes_mut()) {
-            Ok(done) => {
-                next += done;
-                let block = Block::open(slab.bytes())?;
-                records = 64.max(block.records() / done + 16);
-                let extent = block.extent(slab.bytes());
-                slab.truncate(extent);
-                slabs.push(slab);
-            }
-            Err(Error::BufferTooSmall { .. }) if unmerged < 1 << 28 => unmerged *= 4,
-            Err(error) => return Err(error),
-        }
+/// Memory of one piece's blocks, each of its own.
+#[derive(Debug, Default)]
+struct Slabs {
+    blocks: Vec<Memory>,
+    kept: usize,
+}
+
+impl BlockMemory for Slabs {
+    fn lend(&mut self, bytes: usize) -> Result<&mut [u8], Error> {
+        self.blocks.truncate(self.kept);
+        self.blocks.push(Memory::new(bytes));
+        Ok(self.blocks.last_mut().map(Memory::bytes_mut).unwrap_or_default())
     }
-    Ok(slabs)
+
+    fn keep(&mut self, bytes: usize) {
+        if let Some(last) = self.blocks.last_mut() {
+            last.truncate(bytes);
+        }
+        self.kept = self.blocks.len();
+    }
 }
 
 struct Clock(Instant);

@@ -5,10 +5,12 @@
 //! is decided here, so that all of them give the same bits.
 
 mod beams;
+mod geometry;
 mod light;
 mod solve;
 
 pub use beams::Beams;
+pub use geometry::{BlockMemory, BlockPlace, CouplingRows, least_bytes, places, refine};
 pub use light::{Lighting, Scratch, Sizes};
 
 use crate::base::error::Error;

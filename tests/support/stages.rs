@@ -6,11 +6,10 @@
 #![allow(dead_code)]
 
 use blik_kernel::Error;
-use blik_kernel::arena::Arena;
+use blik_kernel::arena::{Arena, Memory};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput};
 use blik_kernel::chain::Solved;
-use blik_kernel::coupling::rows::{self, RowSettings};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
 use blik_kernel::facing::Facing;
@@ -22,7 +21,7 @@ use blik_kernel::settings;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyInput, SkyModel};
-use blik_kernel::stages::{Beams, Executor, Lighting, Merge, Sizes};
+use blik_kernel::stages::{self, Beams, BlockPlace, CouplingRows, Executor, Lighting, Merge, Sizes};
 use blik_kernel::subdivide::Cut;
 use blik_kernel::sun::{Sun, SunInput};
 use std::ops::Range;
@@ -53,8 +52,9 @@ pub struct Counts {
     pub intensity: [f64; 4],
 }
 
-/// Most ranges of a stage.
+/// Most ranges of a stage, and most blocks of its coupling.
 const PARTS: usize = 8;
+const BLOCKS: usize = 1024;
 const CELLS: usize = 32;
 
 /// All memory of a run.
@@ -62,7 +62,8 @@ pub struct Workspace {
     scene: Vec<u8>,
     bvh: Vec<u8>,
     elements: Vec<u8>,
-    blocks: Vec<Vec<u8>>,
+    blocks: Memory,
+    places: Vec<BlockPlace>,
     trees: Vec<u8>,
     planes: Vec<u8>,
     pub tables: Tables,
@@ -103,7 +104,8 @@ impl Workspace {
             scene: vec![0xa5; facets * 512 + 8192],
             bvh: vec![0xa5; Bvh::bytes(facets).unwrap()],
             elements: vec![0xa5; 4 * (unknowns + 4 * facets) + 1024],
-            blocks: vec![vec![0xa5; block]; PARTS],
+            blocks: Memory::new(PARTS * block),
+            places: vec![BlockPlace::default(); BLOCKS],
             // what a table of planes takes at most
             planes: vec![0xa5; 10 << 20],
             // trees of quarters, at the tightest tolerance of these tests
@@ -197,27 +199,6 @@ fn split<T>(
     Ok(())
 }
 
-/// Fills one block per range and opens them; ranges must fit into their blocks.
-fn fill_blocks<'m>(
-    parts: usize,
-    count: usize,
-    memory: &'m mut [Vec<u8>],
-    mut fill: impl FnMut(Range<usize>, &mut [u8]) -> Result<usize, Error>,
-) -> Result<[Block<'m>; PARTS], Error> {
-    split(parts, parts, 1, &mut memory[..parts], |part, block| {
-        let range = part.start * count / parts..(part.start + 1) * count / parts;
-        let wanted = range.len();
-        assert_eq!(fill(range, &mut block[0])?, wanted, "the blocks of the workspace are large enough");
-        Ok(())
-    })?;
-    let memory = &*memory;
-    let mut blocks = [Block::open(&memory[0])?; PARTS];
-    for (block, memory) in blocks.iter_mut().zip(&memory[..parts]) {
-        *block = Block::open(memory)?;
-    }
-    Ok(blocks)
-}
-
 /// From the mesh to image and signature; results are left in the workspace.
 pub fn run(
     work: &mut Workspace,
@@ -238,26 +219,22 @@ pub fn run(
     // uniform skies need no directions: what nothing hides is in closed form then
     let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
     let facing = Facing::new(&scene, &bvh, !directional, &mut work.planes)?;
-    let row_settings = RowSettings::new(&scene, plan.tolerance, None, directional, false);
-    let probing = settings::probing(&row_settings);
+    let asked = settings::Settings { directional, ..settings::Settings::new(plan.tolerance, None)? };
     let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
-    loop {
-        let (fresh, unevenness) = cut.work();
-        split(parts, fresh.len(), 1, unevenness, |range, out| {
-            counts.visibility += fresh.probe(&scene, &bvh, &facing, (probing, plan.tolerance), range, out)?;
-            Ok(())
-        })?;
-        if !cut.refine(&scene) {
-            break;
-        }
-    }
+    let mut run = Backward { parts };
+    counts.visibility += stages::refine(&scene, &bvh, &facing, &asked, &mut cut, &mut run)?;
     let bytes = Elements::bytes(&cut)?;
     let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
-    let blocks = fill_blocks(parts, counts.unknowns, &mut work.blocks, |range, memory| {
-        rows::fill(&scene, &bvh, &elements, &facing, &row_settings, range, memory)
-    })?;
-    let coupling = Coupling::new(&blocks[..parts], counts.unknowns)?;
+    let rows = asked.rows(&scene);
+    let rows = CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, facing: &facing, rows };
+    let places = &mut work.places[..rows.places()];
+    let (places, end) = rows.fill_in(work.blocks.bytes_mut(), places, false, &mut run)?;
+    let mut blocks = [Block::EMPTY; BLOCKS];
+    for (block, place) in blocks.iter_mut().zip(places) {
+        *block = place.open(&work.blocks.bytes()[..end])?;
+    }
+    let coupling = Coupling::new(&blocks[..places.len()], counts.unknowns)?;
     counts.visibility += coupling.rays();
     for (_, row) in coupling.rows(0..counts.unknowns) {
         counts.records += row.targets.len() + row.escapes.map(|b| b.packed.len()).sum::<usize>();
@@ -267,7 +244,6 @@ pub fn run(
         sky: sky.map(|s| Sky::new(s, scene.bands())).transpose()?,
         sun: sun.map(|s| Sun::new(s, scene.bands())).transpose()?,
     };
-    let asked = settings::Settings::new(plan.tolerance, None)?;
     let lighting = Lighting {
         scene: &scene,
         bvh: &bvh,
@@ -277,7 +253,6 @@ pub fn run(
         settings: &asked,
     };
     let Tables { kept, scratch, beams: beam_memory, bits, used } = &mut work.tables;
-    let mut run = Backward { parts };
     let sizes = Sizes::new(&scene, &elements, &light, &asked)?;
     let needed = sizes.solution.need().bytes()?;
     let mut memory = sizes.solution.take(&mut Arena::new(&mut kept[..needed], needed)?)?;

@@ -180,6 +180,10 @@ pub enum Error {
     Diverges {
         row_sum: f64,
     },
+    /// The system gives no more memory.
+    OutOfMemory {
+        bytes: usize,
+    },
     /// The caller's progress function asked to stop.
     Cancelled,
     /// A baked block is damaged, of another version or byte order, or none.
@@ -242,6 +246,7 @@ impl fmt::Display for Error {
                     "the interreflections diverge: a closed part reflects all light (row sum {row_sum})"
                 )
             }
+            Error::OutOfMemory { bytes } => write!(f, "the system gives no {bytes} bytes of memory"),
             Error::Cancelled => write!(f, "cancelled"),
             Error::Block => {
                 write!(f, "the baked block is damaged, of another version or byte order, or none")
