@@ -150,7 +150,7 @@ fn pixels_are_finite_whatever_the_irradiances_are() {
     case.with_lit(1, &within(1e-2), |_, lit| {
         let mut solved = lit.solved();
         let (huge, unsure) = (vec![1e44; solved.irradiance.len()], vec![1.0; solved.variance.len()]);
-        (solved.irradiance, solved.variance) = (&huge, &unsure);
+        (solved.solution.irradiance, solved.solution.variance) = (&huge, &unsure);
         let input = case::perspective([0.5, 3.0, 2.0], [0.0, 0.5, 0.0], 40.0, 8);
         for (sampling, rays) in
             [(Sampling::Centre, u64::MAX), (Sampling::Area, u64::MAX), (Sampling::Area, 0)]

@@ -12,6 +12,7 @@ use blik_kernel::image::{Target, rows, scratch_bytes};
 use blik_kernel::light::{self, Light, Shape, sky_rows};
 use blik_kernel::math::{FRAC_1_PI, PI, Vec3};
 use blik_kernel::mirror::OFFSET;
+use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::radiosity::{System, bound};
 use blik_kernel::ray::Ray;
 use blik_kernel::sky::{Sky, SkyModel};
@@ -60,7 +61,8 @@ fn plain_radiosity(
 fn image_of(lit: &Lit<'_>, system: &System<'_>, radiance: &[f64], camera: &CameraInput) -> Vec<f32> {
     let mut irradiance = vec![0.0; system.elements.unknowns() * system.shape.stride()];
     system.gather(0..system.elements.unknowns(), 0, |_| radiance, &mut irradiance).unwrap();
-    let solved = Solved { irradiance: &irradiance, ..lit.solved() };
+    let solved = lit.solved();
+    let solved = Solved { solution: Solution { irradiance: &irradiance, ..solved.solution }, ..solved };
     let camera = Camera::new(camera, system.scene).unwrap();
     let mut image = vec![0.0; camera.columns() * camera.rows()];
     let mut scratch = vec![0; scratch_bytes(&camera, 1).unwrap()];

@@ -52,7 +52,10 @@ fn memory_that_is_enough_changes_no_bit_and_less_takes_fewer_rays() {
         assert!(less.3 > free.3, "fewer rays are less sure: {} and {}", less.3, free.3);
         let none = Settings { memory_budget: Some(4096), ..settings.clone() };
         let refused = run(&none, threads).unwrap_err();
-        assert!(matches!(refused, Error::BufferTooSmall { needed, given: 4096 } if needed > 4096), "{refused}");
+        assert!(
+            matches!(refused, Error::BufferTooSmall { needed, given: 4096 } if needed > 4096),
+            "{refused}"
+        );
     }
 }
 
@@ -110,7 +113,8 @@ fn sweeps(folder: &Path) -> Vec<String> {
 #[test]
 fn one_place_outside_its_wing_sweeps() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let folders = ["kernel/src", "kernel/examples", "ffi/src", "tests/support", "benches"].map(|folder| root.join(folder));
+    let folders = ["kernel/src", "kernel/examples", "ffi/src", "tests/support", "benches"]
+        .map(|folder| root.join(folder));
     let mut found: Vec<String> = folders.iter().flat_map(|folder| sweeps(folder)).collect();
     found.retain(|path| !path.contains("/radiosity") && !path.contains("/plane/"));
     assert_eq!(found.len(), 1, "{found:?}");

@@ -12,7 +12,8 @@ use blik_kernel::chain::Solved;
 use blik_kernel::light::{self, Light};
 use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::scene::MAX_BANDS;
-use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use blik_kernel::sky::record::SkyRecord;
+use blik_kernel::sky::{Sky, SkyInput};
 use blik_kernel::stages::{Beams, Lighting, Sizes};
 use blik_kernel::sun::{Sun, SunInput};
 use core::ffi::c_void;
@@ -67,18 +68,12 @@ impl blik_solution {
 
     pub(crate) fn solved(&self) -> Solved<'_> {
         let (base, settings) = (self.coupling.base, &self.coupling.settings);
-        let Solution { shape, reference, irradiance, images, variance, numbers, .. } = self.record;
         Solved {
             scene: &base.scene,
             bvh: &base.bvh,
             elements: &self.coupling.elements,
             light: &self.light,
-            irradiance,
-            images,
-            shape,
-            variance,
-            reference,
-            brightest: numbers.brightest,
+            solution: self.record,
             settings: settings.asked.chains(self.coupling.rays),
         }
     }
@@ -118,29 +113,20 @@ unsafe fn given_sky<'a>(sky: *const blik_sky, bands: usize) -> Result<Option<Sky
         let sky = read(sky)?;
         (sky, values(sky.radiance, bands, &ONES)?, values(sky.ground, bands, &ZEROS)?)
     };
-    let model = match sky.model {
-        BLIK_SKY_UNIFORM => SkyModel::Uniform,
-        BLIK_SKY_HEMISPHERE => SkyModel::Hemisphere,
-        BLIK_SKY_OVERCAST => SkyModel::Overcast,
-        BLIK_SKY_CIE => SkyModel::Cie { kind: sky.cie_type, sun_direction: sky.sun_direction },
-        BLIK_SKY_GRADIENT => SkyModel::Gradient,
-        BLIK_SKY_TABLE => {
-            let count = sky.table_rows.checked_mul(sky.table_columns);
-            let count = count.and_then(|n| n.checked_mul(sky.table_bands));
-            let count = count.ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_SKY_TABLE))?;
-            let zero = sky.table_azimuth_zero;
-            SkyModel::Table(SkyTable {
-                rows: sky.table_rows,
-                columns: sky.table_columns,
-                bands: sky.table_bands,
-                // SAFETY: by the caller's promise.
-                radiance: unsafe { input(sky.table, count) }?,
-                azimuth_zero: (zero != [0.0; 3]).then_some(zero),
-            })
-        }
-        other => return Err(blik_error::of(BLIK_ERROR_CHOICE).at(0, 0, f64::from(other))),
+    let choice = blik_error::of(BLIK_ERROR_CHOICE).at(0, 0, f64::from(sky.model));
+    let table = sky.model == BLIK_SKY_TABLE;
+    let record = SkyRecord {
+        // the constants of the header begin with 0
+        model: u64::try_from(sky.model).map_err(|_| choice)? + 1,
+        cie_type: u64::from(sky.cie_type),
+        up: sky.up,
+        direction: if table { sky.table_azimuth_zero } else { sky.sun_direction },
+        table: [sky.table_rows, sky.table_columns, sky.table_bands].map(|n| n as u64),
     };
-    Ok(Some(SkyInput { model, radiance, ground, up: sky.up }))
+    let count = record.samples().ok_or(blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_SKY_TABLE))?;
+    // SAFETY: by the caller's promise.
+    let samples = unsafe { input(sky.table, count) }?;
+    record.input(radiance, ground, samples).ok_or(choice).map(Some)
 }
 
 impl Given<'_> {
@@ -195,10 +181,7 @@ struct Plan {
 impl Plan {
     fn new(coupling: &blik_coupling, given: &Given<'_>) -> Result<Plan, blik_error> {
         let scene = &coupling.base.scene;
-        let samples = match given.sky.map(|s| s.model) {
-            Some(SkyModel::Table(table)) => table.radiance.len(),
-            _ => 0,
-        };
+        let samples = given.sky.map_or(0, |sky| sky.model.samples().len());
         let light = given.light(scene.bands())?;
         let sizes = Sizes::new(scene, &coupling.elements, &light, &coupling.settings.asked)?;
         Ok(Plan { sizes, samples })
@@ -236,25 +219,9 @@ fn keep(given: &Given<'_>, plan: &Plan, arena: &mut Arena<'static>) -> Result<Ke
     };
     let irradiance = copy(given.sun.map_or(&[], |s| s.irradiance))?;
     let samples = arena.take::<f32>(plan.samples)?;
-    let sky = given.sky.map(|sky| {
-        let model = match sky.model {
-            SkyModel::Table(table) => {
-                samples.iter_mut().zip(table.radiance).for_each(|(to, from)| *to = *from);
-                SkyModel::Table(SkyTable {
-                    rows: table.rows,
-                    columns: table.columns,
-                    bands: table.bands,
-                    radiance: samples,
-                    azimuth_zero: table.azimuth_zero,
-                })
-            }
-            SkyModel::Uniform => SkyModel::Uniform,
-            SkyModel::Hemisphere => SkyModel::Hemisphere,
-            SkyModel::Overcast => SkyModel::Overcast,
-            SkyModel::Gradient => SkyModel::Gradient,
-            SkyModel::Cie { kind, sun_direction } => SkyModel::Cie { kind, sun_direction },
-        };
-        SkyInput { model, radiance, ground, up: sky.up }
+    let sky = given.sky.and_then(|sky| {
+        samples.iter_mut().zip(sky.model.samples()).for_each(|(to, from)| *to = *from);
+        SkyRecord::new(&sky).input(radiance, ground, samples)
     });
     let sun = given.sun.map(|sun| SunInput {
         direction: sun.direction,

@@ -20,7 +20,8 @@ use crate::radiosity::solution::{self, Numbers};
 use crate::radiosity::sun_image::{self, SunImages};
 use crate::rays::bvh::Bvh;
 use crate::scene::light;
-use crate::scene::sky::{Sky, SkyInput, SkyModel, SkyTable};
+use crate::scene::sky::record::SkyRecord;
+use crate::scene::sky::{Sky, SkyInput};
 use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{MAX_BANDS, Scene};
 use crate::settings::{self, Settings};
@@ -72,16 +73,8 @@ pub struct Solution<'m> {
 plain_struct! {
     /// The light without its arrays.
     pub struct LightHead {
-        /// 0: none; else the sky's model, 1 + its place in [`SkyModel`].
-        pub model: u64,
-        /// Type of a CIE sky.
-        pub cie_type: u64,
-        /// Toward the zenith.
-        pub up: [f64; 3],
-        /// Sun of a CIE sky, or azimuth 0 of a table.
-        pub direction: [f64; 3],
-        /// Rows, columns and bands of a table.
-        pub table: [u64; 3],
+        /// The sky; of model 0 where there is none.
+        pub sky: SkyRecord,
         /// 1 where there is a sun.
         pub sun: u64,
         /// Toward the sun.
@@ -257,23 +250,8 @@ impl<'m> Solution<'m> {
         let mut head = LightHead::default();
         let (mut radiance, mut ground, mut samples): (&[f64], &[f64], &[f32]) = (&[], &[], &[]);
         if let Some(sky) = &self.sky {
-            (radiance, ground, head.up) = (sky.radiance, sky.ground, sky.up);
-            head.model = match sky.model {
-                SkyModel::Uniform => 1,
-                SkyModel::Hemisphere => 2,
-                SkyModel::Overcast => 3,
-                SkyModel::Cie { kind, sun_direction } => {
-                    (head.cie_type, head.direction) = (u64::from(kind), sun_direction);
-                    4
-                }
-                SkyModel::Gradient => 5,
-                SkyModel::Table(table) => {
-                    head.table = [table.rows as u64, table.columns as u64, table.bands as u64];
-                    head.direction = table.azimuth_zero.unwrap_or_default();
-                    samples = table.radiance;
-                    6
-                }
-            };
+            (radiance, ground, samples) = (sky.radiance, sky.ground, sky.model.samples());
+            head.sky = SkyRecord::new(sky);
         }
         if let Some(sun) = &self.sun {
             (head.sun, head.sun_direction, head.half_angle_deg) = (1, sun.direction, sun.half_angle_deg);
@@ -299,30 +277,11 @@ impl<'m> Solution<'m> {
         let head = view.take::<LightHead>(1)?.first().copied().ok_or(Error::Block)?;
         let (radiance, ground) = (view.take::<f64>(bands)?, view.take::<f64>(bands)?);
         let irradiance = view.take::<f64>(bands)?;
-        let [rows, columns, depth] = head.table.map(|n| usize::try_from(n).unwrap_or(usize::MAX));
-        let count = rows.checked_mul(columns).and_then(|n| n.checked_mul(depth)).ok_or(Error::Block)?;
-        let samples = view.take::<f32>(count)?;
-        let azimuth_zero = (head.direction != [0.0; 3]).then_some(head.direction);
-        let model = match head.model {
+        let samples = view.take::<f32>(head.sky.samples().ok_or(Error::Block)?)?;
+        let sky = match head.sky.model {
             0 => None,
-            1 => Some(SkyModel::Uniform),
-            2 => Some(SkyModel::Hemisphere),
-            3 => Some(SkyModel::Overcast),
-            4 => {
-                let kind = u32::try_from(head.cie_type).map_err(|_| Error::Block)?;
-                Some(SkyModel::Cie { kind, sun_direction: head.direction })
-            }
-            5 => Some(SkyModel::Gradient),
-            6 => Some(SkyModel::Table(SkyTable {
-                rows,
-                columns,
-                bands: depth,
-                radiance: samples,
-                azimuth_zero,
-            })),
-            _ => return Err(Error::Block),
+            _ => Some(head.sky.input(radiance, ground, samples).ok_or(Error::Block)?),
         };
-        let sky = model.map(|model| SkyInput { model, radiance, ground, up: head.up });
         let (direction, half_angle_deg) = (head.sun_direction, head.half_angle_deg);
         let sun = (head.sun == 1).then_some(SunInput { direction, irradiance, half_angle_deg });
         if let Some(sky) = &sky {

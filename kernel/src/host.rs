@@ -456,20 +456,8 @@ impl Lit<'_> {
     /// The solved scene as the kernel's ray and image routines take it.
     pub fn solved(&self) -> Solved<'_> {
         let Geometry { scene, bvh, elements, settings, rays, .. } = self.geometry;
-        let Solution { shape, reference, irradiance, images, variance, numbers, .. } = self.solution();
-        Solved {
-            scene,
-            bvh,
-            elements,
-            light: &self.light,
-            irradiance,
-            images,
-            shape,
-            variance,
-            reference,
-            brightest: numbers.brightest,
-            settings: settings.chains(*rays),
-        }
+        let (light, solution, settings) = (&self.light, self.solution(), settings.chains(*rays));
+        Solved { scene, bvh, elements, light, solution, settings }
     }
 
     /// The record of the solution.

@@ -264,20 +264,8 @@ pub fn run(
     counts.beams = beams.rays;
     let solution = lighting.solve(memory, &mut scratch, counts.sun + counts.beams, &mut run)?;
     counts.sweeps = solution.numbers.sweeps as u32;
-    let Solution { shape, reference, irradiance, images, variance, numbers, .. } = solution;
-    let solved = Solved {
-        scene: &scene,
-        bvh: &bvh,
-        elements: &elements,
-        light: &light,
-        irradiance,
-        images,
-        shape,
-        variance,
-        reference,
-        brightest: numbers.brightest,
-        settings: asked.chains(coupling.rays()),
-    };
+    let settings = asked.chains(coupling.rays());
+    let solved = Solved { scene: &scene, bvh: &bvh, elements: &elements, light: &light, solution, settings };
     view(&solved, parts, camera, &mut work.view, &mut counts)?;
     *used = note(&solution, bits);
     Ok(counts)

@@ -4,6 +4,7 @@
 //! ISO 15469 (`cie`) and sampled skies (`table`) are integrated numerically.
 
 mod cie;
+pub mod record;
 mod sum;
 mod table;
 

@@ -16,14 +16,14 @@ use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::element::{Elements, Local};
-use crate::radiosity::direct::Shape;
-use crate::radiosity::sun_image::SunImages;
+use crate::radiosity::solution::Solution;
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::{Hit, Ray};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::view::camera::Camera;
+use core::ops::Deref;
 use outlook::Toward;
 
 /// How far chains are followed.
@@ -87,20 +87,19 @@ pub struct Solved<'a> {
     pub elements: &'a Elements<'a>,
     /// The light.
     pub light: &'a Light<'a>,
-    /// Irradiance without the sun's direct part and that of its images: mean and gradients of each element side.
-    pub irradiance: &'a [f64],
-    /// Images of the sun in flat mirrors; what they throw is not in `irradiance`.
-    pub images: SunImages<'a>,
-    /// Shape of `irradiance`.
-    pub shape: Shape,
-    /// Expected squared error of each unknown's irradiance over pi, relative to the reference radiance.
-    pub variance: &'a [f32],
-    /// Reference radiance, one value per band.
-    pub reference: &'a [f64],
-    /// Largest radiance that any ray can see, relative to the reference radiance, over all bands.
-    pub brightest: f64,
+    /// The record of its solution.
+    pub solution: Solution<'a>,
     /// How far chains are followed.
     pub settings: ChainSettings,
+}
+
+/// The record's fields, which every step of a chain reads.
+impl<'a> Deref for Solved<'a> {
+    type Target = Solution<'a>;
+
+    fn deref(&self) -> &Solution<'a> {
+        &self.solution
+    }
 }
 
 plain_table! {
@@ -454,10 +453,10 @@ impl Solved<'_> {
                 *through *= rho;
                 largest = f64::max(largest, *through);
             }
-            if largest * self.brightest < self.settings.cutoff
+            if largest * self.numbers.brightest < self.settings.cutoff
                 || leg.mirrors as usize >= crate::coupling::word::LONGEST
             {
-                path.tail += largest * self.brightest;
+                path.tail += largest * self.numbers.brightest;
                 self.close(leg, terms);
                 return None;
             }
