@@ -1,5 +1,6 @@
 //! Kholopov's lobe in three dimensions: closed forms, and samples against brute force.
 
+use approx::{abs_diff_eq, assert_abs_diff_eq};
 use blik_kernel::lobe::Lobe;
 use blik_kernel::math::{PI, TAU, Vec3, cos, sin};
 use blik_kernel::{Error, Field};
@@ -42,13 +43,17 @@ fn solid_angle_and_half_energy_angles() {
     for (ratio, omega, half) in [(50.0, 0.00984, 8.05), (10.0, 0.14614, 17.55), (3.0, 0.86285, 30.0)] {
         let lobe = lobe(ratio);
         // printed to five decimals and to two
-        assert!((1.0 / lobe.value(1.0) - omega).abs() < 5e-6);
+        assert_abs_diff_eq!(1.0 / lobe.value(1.0), omega, epsilon = 5e-6);
         assert!((1.0 / lobe.value(1.0) - PI * f64::ln(ratio * ratio) / (ratio * ratio - 1.0)).abs() < 1e-14);
-        assert!((lobe.equivalent_solid_angle(1.0) - omega).abs() < 5e-6);
-        assert!((lobe.equivalent_solid_angle(0.2) * lobe.value(1.0) - lobe.albedo(0.2)).abs() < 1e-15);
+        assert_abs_diff_eq!(lobe.equivalent_solid_angle(1.0), omega, epsilon = 5e-6);
+        assert_abs_diff_eq!(
+            lobe.equivalent_solid_angle(0.2) * lobe.value(1.0),
+            lobe.albedo(0.2),
+            epsilon = 1e-15
+        );
         let angle = lobe.sample(Vec3::Z, Vec3::Z, 0.5, 0.3).z.acos().to_degrees();
         assert!((lobe.cone(0.5).to_degrees() - angle).abs() < 1e-9 && lobe.cone(0.0) == 0.0);
-        assert!((angle - half).abs() < 6e-3, "{ratio}: {angle}");
+        assert!(abs_diff_eq!(angle, half, epsilon = 6e-3), "{ratio}: {angle}");
     }
     assert_eq!(lobe(3.0).value(0.0), 0.0);
     assert_eq!(lobe(3.0).value(-0.5), 0.0);
@@ -70,18 +75,18 @@ fn albedo_means() {
             (mean(4000, |t| a(t) * sin(2.0 * angle(t)) * PI / 2.0), hemisphere, lobe.cosine_mean_albedo()),
             (mean(4000, a), plain, lobe.mean_albedo()),
         ] {
-            assert!((got - want).abs() < 6e-5, "{ratio}: {got}");
+            assert!(abs_diff_eq!(got, want, epsilon = 6e-5), "{ratio}: {got}");
             // the midpoint rule of 4,000 points, on an integrand that bends within 1/ratio of its end
-            assert!((got - 0.8 * closed).abs() < 2e-6, "{ratio}: {got} {closed}");
+            assert!(abs_diff_eq!(got, 0.8 * closed, epsilon = 2e-6), "{ratio}: {got} {closed}");
         }
     }
     // at a ratio of 1 A is (1 + cos)/2, and nothing happens on the way there
     for excess in [0.0, 1e-15, 1e-12, 1e-9, 1e-7, 4.9e-4, 5.1e-4] {
         let lobe = lobe(1.0 + excess);
         let near = excess + 1e-12;
-        assert!((lobe.line_mean_albedo() - 0.5 - PI / 8.0).abs() < near, "{excess}");
-        assert!((lobe.cosine_mean_albedo() - 5.0 / 6.0).abs() < near, "{excess}");
-        assert!((lobe.mean_albedo() - 0.5 - 1.0 / PI).abs() < near, "{excess}");
+        assert!(abs_diff_eq!(lobe.line_mean_albedo() - 0.5, PI / 8.0, epsilon = near), "{excess}");
+        assert!(abs_diff_eq!(lobe.cosine_mean_albedo(), 5.0 / 6.0, epsilon = near), "{excess}");
+        assert!(abs_diff_eq!(lobe.mean_albedo() - 0.5, 1.0 / PI, epsilon = near), "{excess}");
     }
     for ratio in [1e3, 9999.0, 1e4] {
         let lobe = lobe(ratio);
@@ -107,11 +112,11 @@ fn albedo_is_the_integral_over_shares_of_azimuth() {
             });
             let got = lobe(ratio).albedo(c);
             // the integrand's square-root corner under 2e5 cells: 2e5^(-3/2)
-            assert!((got - want).abs() < 2e-8, "{ratio} {degrees}: {got} {want}");
+            assert!(abs_diff_eq!(got, want, epsilon = 2e-8), "{ratio} {degrees}: {got} {want}");
         }
         assert_eq!(lobe(ratio).albedo(1.0), 1.0);
-        assert!((lobe(ratio).albedo(0.0) - 0.5).abs() < 1e-15);
-        assert!((lobe(ratio).albedo(0.3) + lobe(ratio).albedo(-0.3) - 1.0).abs() < 1e-15);
+        assert_abs_diff_eq!(lobe(ratio).albedo(0.0), 0.5, epsilon = 1e-15);
+        assert_abs_diff_eq!(lobe(ratio).albedo(0.3) + lobe(ratio).albedo(-0.3), 1.0, epsilon = 1e-15);
     }
 }
 
@@ -160,7 +165,7 @@ fn samples_integrate_the_visible_lobe() {
                 let want = brute(&lobe, m, 800, f);
                 // the sunflower's error is near 1/n of the function's range, times a few; the brute force's
                 // midpoints leave 1e-4 at the horizon's step
-                assert!((got / want - 1.0).abs() < 2e-4, "{ratio} {degrees} {k}: {got} {want}");
+                assert!(abs_diff_eq!(got / want, 1.0, epsilon = 2e-4), "{ratio} {degrees} {k}: {got} {want}");
             }
         }
     }
@@ -178,7 +183,7 @@ fn samples_have_equal_energy_in_every_cell() {
         let got = mean(n, |u| mean(n, |v| inside(lobe.sample(m, Vec3::Z, u, v)))) * lobe.albedo(m.z);
         let want = brute(&lobe, m, 1000, inside);
         // cells of the square that the part's edge crosses: 1/n of the energy at most, mostly cancelling
-        assert!((got - want).abs() < 1e-3, "{k}: {got} {want}");
+        assert!(abs_diff_eq!(got, want, epsilon = 1e-3), "{k}: {got} {want}");
     }
 }
 
@@ -195,9 +200,9 @@ fn ray_sets() {
         for i in 1..7 {
             let (a, b) =
                 (lobe.ray(i, 7, 0.0, Vec3::Z, Vec3::Z), lobe.ray(i % 6 + 1, 7, 0.0, Vec3::Z, Vec3::Z));
-            assert!((1.0 - a.z * a.z - sin2).abs() < 1e-13);
+            assert_abs_diff_eq!(1.0 - a.z * a.z, sin2, epsilon = 1e-13);
             // neighbours 60 degrees apart
-            assert!((a.truncate().dot(b.truncate()) / sin2 - 0.5).abs() < 1e-12);
+            assert_abs_diff_eq!(a.truncate().dot(b.truncate()) / sin2, 0.5, epsilon = 1e-12);
         }
         // symmetric about the plane of incidence
         for n in [2, 3, 5, 7] {
@@ -212,7 +217,7 @@ fn ray_sets() {
     // the great circle through the ray and the y axis parts the lobe
     let side = Vec3::new(-ray.z, 0.0, ray.x);
     let above = brute(&lobe, m, 2000, |d| if d.dot(side) > 0.0 { 1.0 } else { 0.0 });
-    assert!((above / lobe.albedo(m.z) - 0.5).abs() < 1e-3);
+    assert_abs_diff_eq!(above / lobe.albedo(m.z), 0.5, epsilon = 1e-3);
 }
 
 #[test]
