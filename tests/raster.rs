@@ -49,6 +49,9 @@ fn meshes() -> Vec<(&'static str, Vec<Facet>)> {
     mixed.extend(cube(Vec3::new(0.3, -0.2, 0.1), 0.5));
     let mut twice = cube(Vec3::ZERO, 0.6);
     twice.extend(cube(Vec3::ZERO, 0.6));
+    // backs before fronts that coincide with them, from other corners on
+    let mut sheets: Vec<Facet> = cube(Vec3::ZERO, 0.6).iter().map(|&[a, b, c]| [b, a, c]).collect();
+    sheets.extend(cube(Vec3::ZERO, 0.6));
     let mut odd = ball(6, Vec3::new(0.1, 0.0, 0.0), 0.4);
     odd.push([Vec3::new(-0.9, -0.9, 0.5), Vec3::new(0.9, 0.9, 0.5), Vec3::new(0.9, 0.9 + 1e-9, 0.5)]);
     odd.push([Vec3::new(-0.5, 0.5, 0.6), Vec3::new(0.5, 0.5, 0.6), Vec3::new(0.0, 0.5, 0.6)]);
@@ -57,6 +60,7 @@ fn meshes() -> Vec<(&'static str, Vec<Facet>)> {
         ("cube", cube(Vec3::ZERO, 0.8)),
         ("mixed", mixed),
         ("twice", twice),
+        ("sheets", sheets),
         ("odd", odd),
     ]
 }
@@ -138,7 +142,7 @@ fn drawn_facets_are_those_that_rays_meet() {
                     assert_eq!(compare(&what, bvh, &samples, ROWS).0, met);
                     // rays decide where facets coincide, where they pass the plane of an eye of parallel rays, and
                     // along edges through centres: a grid that is in line with the mesh has many
-                    let generic = n == 3 && name != "twice" && (back > 1.0 || !parallel);
+                    let generic = n == 3 && !["twice", "sheets"].contains(&name) && (back > 1.0 || !parallel);
                     assert!(!generic || unsure * 50 <= met.max(50), "{what}: {unsure} of {met} left to rays");
                 }
             }
@@ -186,9 +190,9 @@ fn lines_show_what_rays_along_them_meet() {
                         let hit = bvh.closest(&samples.ray(row, at));
                         let facet = hit.map_or(NOTHING, |h| h.facet);
                         assert!(
-                            u64::from(facet) == span.facet || span.end - span.start < 1e-9,
+                            facet == span.facet() || span.end - span.start < 1e-9,
                             "{name}, row {row} at {at}: {facet}, not {}",
-                            span.facet
+                            span.facet()
                         );
                     }
                 }

@@ -1,8 +1,8 @@
 //! The bounding volume hierarchy: nodes of eight boxes, packets of eight facets, in caller memory.
 //!
 //! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
-//! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least
-//! `t`, ties to the lowest facet index, whatever the builder and the instruction set.
+//! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least `t`, where facets coincide a
+//! front before a back, then the lowest facet index, whatever the builder and the instruction set.
 
 mod above;
 mod bake;
@@ -222,14 +222,13 @@ impl<'m> Bvh<'m> {
         Bvh { external: tracer.map(|tracer| External { tracer, corners }), ..self }
     }
 
-    /// The first facet that the ray meets: least t with `0 < t < t_max`, then lowest index.
+    /// The first facet that the ray meets: least t with `0 < t < t_max`, where facets coincide a front before a back, then
+    /// the lowest index.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        if let Some(external) = &self.external
-            && let Ok(hit) = external.closest(ray)
-        {
-            return hit;
+        match &self.external {
+            Some(external) => external.closest(self, ray),
+            None => traverse::closest(self, ray),
         }
-        traverse::closest(self, ray)
     }
 
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.

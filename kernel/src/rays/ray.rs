@@ -53,6 +53,53 @@ impl Ray {
     }
 }
 
+/// Distance between sheets that count as one, in units of the mesh's size and the ray's length together: twice what rays at
+/// a cosine of 2^-8 leave of a facet's `t` by rounding, and a third of the smallest gap that is told from contact.
+const COINCIDENT: f64 = 1.0 / (1u64 << 42) as f64;
+
+/// The first of the hits of one ray: the one of least `t`, but among facets that coincide there a front comes before a back,
+/// then the least `t`, then the lowest index. The same whatever the order in which hits come.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct First {
+    /// The mesh's size.
+    pub scale: f64,
+    /// Hits from here on do not count.
+    pub t_max: f64,
+    /// The least `t` of all hits; `t_max` before the first.
+    pub nearest: f64,
+}
+
+impl First {
+    /// Before the first hit.
+    #[inline(always)]
+    pub fn new(scale: f64, t_max: f64) -> First {
+        First { scale, t_max, nearest: t_max }
+    }
+
+    /// Notes a hit, which becomes the `best` where it is the first of all so far.
+    #[inline(always)]
+    pub fn note(&mut self, hit: Hit, best: &mut Option<Hit>) {
+        if hit.t < self.nearest {
+            self.nearest = hit.t;
+            let stays = !hit.front && best.is_some_and(|best| best.front && self.reaches(best.t));
+            *best = if stays { *best } else { Some(hit) };
+        } else if self.reaches(hit.t)
+            && let Some(kept) = *best
+        {
+            let sooner = hit.t < kept.t || hit.t == kept.t && hit.facet < kept.facet;
+            if hit.front & (!kept.front | sooner) || !hit.front & !kept.front & sooner {
+                *best = Some(hit);
+            }
+        }
+    }
+
+    /// Whether what is met at `t` coincides with the nearest.
+    #[inline(always)]
+    fn reaches(&self, t: f64) -> bool {
+        t - self.nearest <= COINCIDENT * (self.scale + self.nearest) && t < self.t_max
+    }
+}
+
 /// Where the ray meets one facet, whose index is `facet`: what a search of the whole mesh would find if it had
 /// this facet alone. `None` too for a ray that has no direction or is not finite.
 ///

@@ -253,8 +253,7 @@ impl Tracer<'_> {
             }
             let ray = self.view.samples.ray(row as isize, at);
             let solved = self.solved;
-            let hit =
-                solved.bvh.closest_among(&ray, &[span.facet as u32]).or_else(|| solved.bvh.closest(&ray));
+            let hit = solved.bvh.closest_among(&ray, &[span.facet()]).or_else(|| solved.bvh.closest(&ray));
             self.follow(&ray, hit, (row, at as u32), sums);
             self.add(share, sums);
         }

@@ -40,12 +40,12 @@ impl fmt::Debug for External<'_> {
 
 // None of these is compiled into its callers, which are many and as a rule have no such tracer.
 impl External<'_> {
-    /// What the tracer says; `Err` for a facet that the ray does not meet in the kernel's arithmetic.
+    /// What the tracer says, or `tree`.
     #[inline(never)]
-    pub fn closest(&self, ray: &Ray) -> Result<Option<Hit>, ()> {
+    pub fn closest(&self, tree: &Bvh<'_>, ray: &Ray) -> Option<Hit> {
         let mut facet = [NO_FACET];
         self.tracer.first(core::slice::from_ref(ray), &mut facet);
-        self.hit(ray, facet[0])
+        self.first(tree, ray, facet[0])
     }
 
     /// Whether rays, at most [`BATCH`], meet anything: 1 or 0, to `hits`. Where the tracer names facets, those that the ray
@@ -71,7 +71,7 @@ impl External<'_> {
         hit[0] != 0
     }
 
-    /// What the tracer says of many rays, or `tree` where an answer names a facet that the ray does not meet.
+    /// What the tracer says of many rays, or `tree`.
     #[inline(never)]
     pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let mut facets = [NO_FACET; BATCH];
@@ -80,7 +80,7 @@ impl External<'_> {
             facets.fill(NO_FACET);
             self.tracer.first(rays, facets);
             for ((ray, hit), &facet) in rays.iter().zip(hits).zip(&*facets) {
-                *hit = self.hit(ray, facet).unwrap_or_else(|()| traverse::closest(tree, ray));
+                *hit = self.first(tree, ray, facet);
             }
         }
     }
@@ -97,6 +97,17 @@ impl External<'_> {
         }
     }
 
+    /// The hit with the facet that the tracer named; that of `tree` where the ray does not meet it, or meets its back, with
+    /// which a front may coincide.
+    #[inline(never)]
+    fn first(&self, tree: &Bvh<'_>, ray: &Ray, facet: u32) -> Option<Hit> {
+        match self.hit(ray, facet) {
+            Ok(hit) if hit.is_none_or(|hit| hit.front) => hit,
+            _ => traverse::closest(tree, ray),
+        }
+    }
+
+    /// The hit with the facet that the tracer named; `Err` for one that the ray does not meet in the kernel's arithmetic.
     #[inline(never)]
     fn hit(&self, ray: &Ray, facet: u32) -> Result<Option<Hit>, ()> {
         if facet == NO_FACET {
@@ -161,7 +172,7 @@ impl Bvh<'_> {
         let own = ray(number);
         let Some(external) = &self.external else { return traverse::closest(self, &own) };
         let facet = ahead.answer(number, end, &ray, &|rays, facets| external.tracer.first(rays, facets));
-        external.hit(&own, facet).unwrap_or_else(|()| traverse::closest(self, &own))
+        external.first(self, &own, facet)
     }
 
     /// [`Bvh::occluded`] of ray `number` of a series, as [`Bvh::closest_of`].

@@ -22,7 +22,7 @@ use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, Slack};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
 use crate::base::simd::{self, LaneTask, Lanes};
-use crate::rays::ray::{Hit, Line, NEXT, Ray};
+use crate::rays::ray::{First, Hit, Line, NEXT, Ray};
 use core::marker::PhantomData;
 
 /// Factor on the far side of slabs: 1 + 2^-20, above the (1 + 2^-24)^10 that near and far sides need together.
@@ -205,7 +205,7 @@ pub(super) struct TraversalRay {
     near: [f32; 4],
     far: [f32; 4],
     inverse: [f32; 4],
-    /// `nearest` for the boxes: from `start`, rounded up.
+    /// The least distance of a hit for the boxes: from `start`, rounded up by more than what coincides lies apart.
     pub limit: f32,
     /// Which side of a box the ray meets first, by axis.
     side: [u8; 3],
@@ -218,8 +218,8 @@ pub(super) struct TraversalRay {
     /// Where the f32 origin stands on the ray, and how far it was moved outward.
     start: f64,
     pad: f64,
-    /// Hits must lie before this; equal `t` counts when the facet's index is lower.
-    nearest: f64,
+    /// What is met first so far.
+    first: First,
 }
 
 impl TraversalRay {
@@ -237,7 +237,7 @@ impl TraversalRay {
         skip: NONE,
         start: 0.0,
         pad: 0.0,
-        nearest: 0.0,
+        first: First { scale: 0.0, t_max: 0.0, nearest: 0.0 },
     };
 
     /// `None` where the ray meets nothing for certain.
@@ -279,18 +279,17 @@ impl TraversalRay {
             skip: ray.skip,
             start,
             pad,
-            nearest: ray.t_max,
+            first: First::new(scale, ray.t_max),
             limit: 0.0,
         };
-        walk.shorten(ray.t_max);
+        walk.shorten();
         Some(walk)
     }
 
-    /// Sets the limit to the hit distance `t`.
+    /// Sets the limit to the distance of the nearest hit.
     #[inline(always)]
-    fn shorten(&mut self, t: f64) {
-        self.nearest = t;
-        self.limit = (t - self.start + self.pad) as f32 * WIDEN;
+    fn shorten(&mut self) {
+        self.limit = (self.first.nearest - self.start + self.pad) as f32 * WIDEN;
     }
 
     /// Depth-first traversal: nearest child first, the rest on the stack with their distances.
@@ -369,11 +368,8 @@ impl TraversalRay {
         let moved = [a, b, c].map(|corner| Vec3::from_array(corner) - ray.origin);
         let edges = line.edges(moved.map(|m| line.image(m.to_array())));
         let Some(hit) = line.hit(facet, edges, moved, Vec3::from_array(normal)) else { return };
-        let tie = hit.t == self.nearest && best.is_some_and(|best| facet < best.facet);
-        if hit.t < self.nearest || tie {
-            self.shorten(hit.t);
-            *best = Some(hit);
-        }
+        self.first.note(hit, best);
+        self.shorten();
     }
 }
 

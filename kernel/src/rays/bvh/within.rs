@@ -5,7 +5,7 @@ use super::path_stack::{EMPTY, push, top};
 use super::{Boxes, Bvh, LANES, LEAF, PAIR, Packet};
 use crate::base::math::{Vec3, fabs};
 use crate::base::simd::{self, LaneTask, Lanes};
-use crate::rays::ray::{Hit, Line, Ray};
+use crate::rays::ray::{First, Hit, Line, Ray};
 
 /// A half space: points p with p.normal >= height; `normal` is a unit vector.
 #[derive(Clone, Copy, Debug)]
@@ -47,14 +47,11 @@ impl Bvh<'_> {
     #[inline]
     pub(crate) fn closest_among(&self, ray: &Ray, facets: &[u32]) -> Option<Hit> {
         let line = Line::new(ray)?;
-        let mut best: Option<Hit> = None;
+        let (mut first, mut best) = (First::new(self.scale, ray.t_max), None);
         for &facet in facets.iter().filter(|facet| **facet != ray.skip) {
-            let Some(hit) = self.meet(&line, ray, facet) else { continue };
-            let better = match &best {
-                None => hit.t < ray.t_max,
-                Some(best) => hit.t < best.t || hit.t == best.t && facet < best.facet,
-            };
-            best = if better { Some(hit) } else { best };
+            if let Some(hit) = self.meet(&line, ray, facet) {
+                first.note(hit, &mut best);
+            }
         }
         best
     }

@@ -16,10 +16,13 @@ plain_struct! {
         pub end: f64,
         /// Nearness at 0, and its slope.
         pub near: [f64; 2],
-        /// The facet.
-        pub facet: u64,
+        /// The facet, with [`BACK`] where its back shows.
+        pub key: u64,
     }
 }
+
+/// Bit of a span's key: of spans that coincide the one with the lower key shows.
+const BACK: u64 = 1 << 32;
 
 /// Most spans of a line.
 const MOST: usize = 1024;
@@ -82,8 +85,10 @@ impl<'m> Lines<'m> {
                 && let Some(triangle) = Triangle::new(&view, corners, normal)
                 && !triangle.thin
             {
+                let back = normal.dot(samples.forward) > 0.0;
+                let key = u64::from(facet) | if back { BACK } else { 0 };
                 for row in triangle.rows.clone() {
-                    self.add(&view, &triangle, facet, row);
+                    self.add(&view, &triangle, key, row);
                 }
             }
             true
@@ -91,12 +96,12 @@ impl<'m> Lines<'m> {
     }
 
     /// Adds a facet to a line.
-    fn add(&mut self, view: &View<'_>, triangle: &Triangle, facet: u32, row: isize) {
+    fn add(&mut self, view: &View<'_>, triangle: &Triangle, key: u64, row: isize) {
         let Some((start, end)) = triangle.ends(view, row) else { return };
         let (x, y) = (-view.middle.0, row as f64 - view.middle.1);
         let [slope, down, level] = triangle.near;
         let near = [level + down * y + slope * x, slope];
-        let new = Span { start: start - x, end: end - x, near, facet: u64::from(facet) };
+        let new = Span { start: start - x, end: end - x, near, key };
         let line = (row - self.first) as usize;
         let Some([count, near]) = self.counts.get_mut(line) else { return };
         let all = line * MOST..(line + 1) * MOST;
@@ -158,7 +163,7 @@ impl Line<'_> {
             pieces.push(new, at, start, true)?;
             pieces.push(old, old.start, start, false)?;
             let (left, right) = (new.lead(old, start), new.lead(old, end));
-            if left.max(right) <= margin && (left.min(right) < -margin || old.facet < new.facet) {
+            if left.max(right) <= margin && (left.min(right) < -margin || old.key < new.key) {
                 pieces.push(old, start, end, false)?;
             } else if left.min(right) >= -margin {
                 pieces.push(new, start, end, true)?;
@@ -205,6 +210,12 @@ fn turn(places: &mut [u16], count: usize) {
 }
 
 impl Span {
+    /// The facet.
+    #[inline]
+    pub fn facet(&self) -> u32 {
+        self.key as u32
+    }
+
     /// How much nearer it is than another, at x.
     #[inline]
     fn lead(&self, other: &Span, x: f64) -> f64 {
@@ -228,7 +239,7 @@ impl Pieces<'_> {
         }
         self.changed |= new;
         if let Some(last) = self.count.checked_sub(1).and_then(|n| self.spans.get_mut(n))
-            && last.facet == of.facet
+            && last.key == of.key
             && last.end == start
         {
             last.end = end;
