@@ -209,6 +209,36 @@ fn every_band_of_every_material_reflects_at_most_all() {
     }
 }
 
+/// A share of single precision and the one nearest to 1 minus it make up more than 1 by rounding: they are a perfect
+/// reflector, which in a sky of 1 has the radiance 1.
+#[test]
+fn reflectances_of_single_precision_make_up_one() {
+    let mut rng = support::twin::Rng(8);
+    let mut above = 0;
+    for _ in 0..200 {
+        let diffuse = rng.unit() as f32;
+        let specular = 1.0 - diffuse;
+        // as programs write them: to the bit, or with nine digits
+        let [d, s] = if rng.unit() < 0.5 {
+            [f64::from(diffuse), f64::from(specular)]
+        } else {
+            [diffuse, specular].map(|x| format!("{x:.7}").parse::<f64>().unwrap())
+        };
+        let [d, s] = [d, s].map(|x| x * (1.0 + (rng.unit() - 0.3) * 2f64.powi(-24)));
+        above += u32::from(d + s > 1.0);
+        let case = Case::new(floor_and_wall(), &[Material::new(d, s), Material::new(0.2, 0.0)]);
+        case.with_input(|input| {
+            let mut memory = Memory::new(blik_kernel::scene::Scene::bytes(input).unwrap());
+            let scene = blik_kernel::scene::Scene::new(input, memory.bytes_mut()).unwrap();
+            let sum = scene.diffuse(0)[0] + scene.specular(0)[0];
+            // two quotients and a sum round
+            assert!(sum <= 1.0 + 4.0 * f64::EPSILON, "{d} + {s}: {sum}");
+            assert!(d + s > 1.0 || (scene.diffuse(0)[0], scene.specular(0)[0]) == (d, s));
+        });
+    }
+    assert!(above > 50, "{above} make up more than 1");
+}
+
 #[test]
 fn slow_convergence_is_waited_for() {
     // light decays by 0.97 a sweep: 28 sweeps, enough for outdoor scenes, would leave 43 % of it out

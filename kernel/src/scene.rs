@@ -14,7 +14,7 @@ pub mod sun;
 
 use crate::base::arena::{Arena, Need};
 use crate::base::error::Error;
-use crate::base::index::{Index, pieces};
+use crate::base::index::{Index, copy, pieces};
 use crate::base::math::{Vec3, sqrt, unit};
 
 pub use input::*;
@@ -111,7 +111,7 @@ impl<'m> Scene<'m> {
         let mirror = arena.take::<u32>(count)?;
         let gloss_ratio = arena.take::<f64>(count)?;
         let gloss_rays = arena.take::<u32>(count)?;
-        lay_mirrors(mesh, mirror, gloss_ratio, gloss_rays);
+        lay_mirrors(mesh, specular, mirror, gloss_ratio, gloss_rays);
         Ok(Scene {
             corners,
             normals,
@@ -196,6 +196,15 @@ impl<'m> Scene<'m> {
             Some(n) if side == 0 => n,
             Some(n) => -n,
             None => flat,
+        }
+    }
+
+    /// Normal for the mirror directions of all points of a side, where they have the same one.
+    pub fn flat_normal(&self, facet: usize, side: usize) -> Option<Vec3> {
+        match self.corner_normals.get(facet) {
+            None => Some(self.side_normal(facet, side)),
+            Some([a, b, c]) if a == b && b == c => Some(if side == 0 { *a } else { -*a }),
+            Some(_) => None,
         }
     }
 
@@ -393,24 +402,27 @@ fn lay_values(mesh: &dyn Mesh, tables: [&mut [f64]; 3]) {
     let [diffuse, specular, emission] = tables.map(|t| pieces(t, mesh.bands()));
     for (index, ((d, s), e)) in diffuse.zip(specular).zip(emission).enumerate() {
         let material = mesh.material(index);
-        for (to, from) in [(d, material.diffuse), (s, material.specular), (e, material.emission)] {
-            to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+        copy(e, material.emission);
+        let told = material.diffuse.iter().zip(material.specular);
+        for ((d, s), (&diffuse, &specular)) in d.iter_mut().zip(s).zip(told) {
+            (*d, *s) = within_one(diffuse, specular);
         }
     }
 }
 
-fn lay_mirrors(mesh: &dyn Mesh, mirror: &mut [u32], ratio: &mut [f64], rays: &mut [u32]) {
+/// `specular` are the materials' mirror reflectances as they were laid out.
+fn lay_mirrors(mesh: &dyn Mesh, specular: &[f64], mirror: &mut [u32], ratio: &mut [f64], rays: &mut [u32]) {
+    let of = |index: usize| specular.part(index * mesh.bands()..(index + 1) * mesh.bands());
     let lobe = |m: &MaterialInput<'_>| m.gloss.filter(|g| g.axis_ratio < MIRROR_AXIS_RATIO);
     for (index, ((mirror, ratio), rays)) in mirror.iter_mut().zip(ratio).zip(rays).enumerate() {
         let material = mesh.material(index);
         let gloss = lobe(&material);
         let same = |other: &usize| {
-            let other = mesh.material(*other);
-            other.specular == material.specular
-                && lobe(&other).map(|g| g.axis_ratio) == gloss.map(|g| g.axis_ratio)
+            of(*other) == of(index)
+                && lobe(&mesh.material(*other)).map(|g| g.axis_ratio) == gloss.map(|g| g.axis_ratio)
         };
         let first = (0..index).find(same).unwrap_or(index);
-        let reflects = material.specular.iter().any(|&s| s > 0.0);
+        let reflects = of(index).iter().any(|&s| s > 0.0);
         *mirror = if reflects { first as u32 } else { NO_MIRROR };
         *ratio = gloss.map_or(0.0, |g| g.axis_ratio);
         *rays = gloss.and_then(|g| g.rays).unwrap_or(0);

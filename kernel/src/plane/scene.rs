@@ -10,7 +10,7 @@ use crate::base::math::{TAU, asin, atan2, clamp, cos, floor, sin};
 use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;
 use crate::plane::stencil::{MAX_ORDER, NODES, Stencil};
-use crate::scene::MIRROR_AXIS_RATIO;
+use crate::scene::{MIRROR_AXIS_RATIO, within_one};
 use check::check;
 use layout::lay_out;
 
@@ -207,7 +207,8 @@ plain_struct! {
 
 impl Material {
     fn new(input: &PlaneMaterial, tolerance: f64) -> Result<Material, Error> {
-        let kept = Material { diffuse: input.diffuse, specular: input.specular, ..Material::default() };
+        let (diffuse, specular) = within_one(input.diffuse, input.specular);
+        let kept = Material { diffuse, specular, ..Material::default() };
         let Some(gloss) = input.gloss.filter(|g| g.axis_ratio < MIRROR_AXIS_RATIO && input.specular > 0.0)
         else {
             return Ok(kept);

@@ -1,6 +1,6 @@
 //! Everything that can be wrong with a scene's input.
 
-use super::{MAX_BANDS, MOST_GLOSS_RAYS, Mesh, NO_NORMAL, corner_normals, normal_facets};
+use super::{MAX_BANDS, MOST_GLOSS_RAYS, MOST_REFLECTANCE, Mesh, NO_NORMAL, corner_normals, normal_facets};
 use crate::base::error::{Error, Field};
 use crate::base::math::{Vec3, unit};
 
@@ -35,8 +35,8 @@ pub(super) fn materials(mesh: &dyn Mesh) -> Result<(), Error> {
     for index in 0..mesh.materials() {
         let material = mesh.material(index);
         let fields = [
-            (Field::Diffuse, material.diffuse, 1.0),
-            (Field::Specular, material.specular, 1.0),
+            (Field::Diffuse, material.diffuse, MOST_REFLECTANCE),
+            (Field::Specular, material.specular, MOST_REFLECTANCE),
             (Field::Emission, material.emission, 1e37),
         ];
         for (field, values, largest) in fields {
@@ -51,8 +51,7 @@ pub(super) fn materials(mesh: &dyn Mesh) -> Result<(), Error> {
             }
         }
         for (band, (d, s)) in material.diffuse.iter().zip(material.specular).enumerate() {
-            // 0.1 + 0.9 may exceed 1 by a rounding
-            if d + s > 1.0 + 4.0 * f64::EPSILON {
+            if d + s > MOST_REFLECTANCE {
                 return Err(Error::ReflectanceSum { material: index, band, sum: d + s });
             }
         }

@@ -18,12 +18,22 @@ pub struct Gloss {
     pub rays: Option<u32>,
 }
 
+/// Reflectances up to 1 and what single precision adds to two that make up 1: four roundings. They are scaled back to 1.
+pub const MOST_REFLECTANCE: f64 = 1.0 + 4.0 / (1u64 << 24) as f64;
+
+/// Reflectances that make up more than 1 by rounding, scaled back to it.
+pub(crate) fn within_one(diffuse: f64, specular: f64) -> (f64, f64) {
+    let sum = diffuse + specular;
+    if sum > 1.0 { (diffuse / sum, specular / sum) } else { (diffuse, specular) }
+}
+
 /// Reflectances and emission of one material, one value per band each.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialInput<'a> {
     /// Diffuse reflectance rho_d, in [0, 1].
     pub diffuse: &'a [f64],
-    /// Mirror reflectance rho_s, in [0, 1]; rho_d + rho_s <= 1. With gloss: the lobe's albedo at normal view.
+    /// Mirror reflectance rho_s, in [0, 1]; rho_d + rho_s <= 1, up to [`MOST_REFLECTANCE`]. With gloss: the lobe's albedo
+    /// at normal view.
     pub specular: &'a [f64],
     /// Own diffuse radiance, >= 0, in W m-2 sr-1.
     pub emission: &'a [f64],

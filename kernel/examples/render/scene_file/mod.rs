@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::failure::{Failure, Outcome};
 use blik_kernel::camera::MAX_RESOLUTION;
+use blik_kernel::scene::MOST_REFLECTANCE;
 use check::Check;
 use glam::DVec3;
 use keys::{CameraKind, CameraSampling, Keys, SkyModel};
@@ -185,7 +186,7 @@ fn read_material(check: &Check, name: &str, keys: keys::Material) -> Outcome<Mat
     let diffuse = check.spectrum(&key("diffuse"), keys.diffuse, 0.0, 1.0)?;
     let specular = check.spectrum(&key("specular"), keys.specular, 0.0, 1.0)?;
     for (band, (d, s)) in diffuse.iter().zip(&specular).enumerate() {
-        if d + s > 1.0 {
+        if d + s > MOST_REFLECTANCE {
             let what = format!("material.{name}: diffuse + specular in band {band}");
             return Err(check.fail(&what, "at most 1", d + s));
         }

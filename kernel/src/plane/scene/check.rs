@@ -5,6 +5,7 @@ use crate::base::error::{Error, Field};
 use crate::base::index::Index;
 use crate::base::math::fabs;
 use crate::plane::{Vec2, length};
+use crate::scene::MOST_REFLECTANCE;
 
 /// Checks materials and bodies.
 pub(super) fn check(input: &PlaneInput<'_>) -> Result<(), Error> {
@@ -16,12 +17,12 @@ pub(super) fn check(input: &PlaneInput<'_>) -> Result<(), Error> {
     }
     for (material, m) in input.materials.iter().enumerate() {
         for (field, value) in [(Field::Diffuse, m.diffuse), (Field::Specular, m.specular)] {
-            if !(0.0..=1.0).contains(&value) {
+            if !(0.0..=MOST_REFLECTANCE).contains(&value) {
                 return Err(Error::MaterialRange { material, band: 0, field, value });
             }
         }
         let sum = m.diffuse + m.specular;
-        if sum > 1.0 + 1e-12 {
+        if sum > MOST_REFLECTANCE {
             return Err(Error::ReflectanceSum { material, band: 0, sum });
         }
         if let Some(gloss) = m.gloss {
