@@ -1,8 +1,9 @@
 //! Kholopov's lobe in three dimensions: closed forms, and samples against brute force.
 
 use approx::{abs_diff_eq, assert_abs_diff_eq};
-use blik_kernel::lobe::Lobe;
+use blik_kernel::lobe::{Highlight, Lobe};
 use blik_kernel::math::{PI, TAU, Vec3, cos, sin};
+use blik_kernel::sun::{Sun, SunInput};
 use blik_kernel::{Error, Field};
 
 fn lobe(axis_ratio: f64) -> Lobe {
@@ -236,5 +237,88 @@ fn no_input_gives_nan() {
         }
         assert!(lobe.ray(5, 0, 0.0, Vec3::Z, Vec3::Z).is_finite());
         assert!(lobe.value(1.0 + 1e-15).is_finite());
+    }
+}
+
+/// Mean of q/rho_0 over a disc, straight from q's definition: midpoint rules in the angle to the disc's middle and in
+/// azimuth, each graded toward the mirror direction.
+fn brute_disc(lobe: &Lobe, angle: f64, half: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let graded = |from: f64, to: f64, n: usize, f: &dyn Fn(f64) -> f64| {
+        let span = to - from;
+        span * mean(n, |t| 3.0 * t * t * f(from + span * t * t * t))
+    };
+    let ring = |at: f64| {
+        let along = |azimuth: f64| {
+            let hav = sin(0.5 * (at - angle)).powi(2) + sin(at) * sin(angle) * sin(0.5 * azimuth).powi(2);
+            f(at, azimuth) * lobe.value(1.0 - 2.0 * hav)
+        };
+        2.0 * sin(at) * graded(0.0, PI, 400, &along)
+    };
+    let energy = if angle < half {
+        graded(angle, 0.0, 400, &|at| -ring(at)).abs() + graded(angle, half, 400, &ring)
+    } else {
+        graded(half, 0.0, 400, &|at| -ring(at)).abs()
+    };
+    energy / (PI * sin(half).powi(2))
+}
+
+#[test]
+fn a_disc_in_a_lobe_is_the_mean_over_it() {
+    let cases = [
+        (300.0, 0.2665, 0.0),
+        (300.0, 0.2665, 0.1),
+        (300.0, 0.2665, 0.266),
+        (300.0, 0.2665, 0.2665),
+        (300.0, 0.2665, 0.5),
+        (300.0, 0.2665, 3.0),
+        (50.0, 2.0, 1.0),
+        (50.0, 2.0, 2.5),
+        (9999.0, 0.2665, 0.05),
+        (10.0, 10.0, 9.0),
+        (10.0, 10.0, 15.0),
+        (1.0, 10.0, 40.0),
+        (2.0, 10.0, 80.0),
+        (30.0, 1e-4, 1.0),
+        (1e3, 0.02, 0.0),
+    ];
+    for (ratio, half, angle) in cases {
+        let lobe = lobe(ratio);
+        let input = |degrees: f64| SunInput {
+            direction: [sin(degrees.to_radians()), 0.0, cos(degrees.to_radians())],
+            irradiance: &[1.0],
+            half_angle_deg: half,
+        };
+        let sun_input = input(angle);
+        let sun = Sun::new(&sun_input, 1).unwrap();
+        let truth = brute_disc(&lobe, angle.to_radians(), half.to_radians(), |_, _| 1.0);
+        let point = lobe.value(cos(angle.to_radians()));
+        let highlight = Highlight::new(&lobe, Vec3::Z, &sun);
+        let value = highlight.map_or(point, |h| h.value);
+        // midpoint rules of 400 graded cells; the integral's own error where the mirror direction meets the edge is 1e-5
+        let tolerance = 1e-4 * truth;
+        assert!((value - truth).abs() < tolerance, "{ratio}, {half}, {angle}: {value}, not {truth}");
+        // samples are as dense as the lobe is high: the share of those on one side is that of the energy there
+        let Some(highlight) = highlight else { continue };
+        let n = 64;
+        let (mut aside, mut inside) = (0.0, 0.0);
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let d =
+                highlight.sample((f64::from(i) + 0.5) / f64::from(n), (f64::from(j) + 0.5) / f64::from(n));
+            let off = (d - sun.direction()).length();
+            assert!(
+                (d.length() - 1.0).abs() < 1e-12
+                    && off <= 2.0 * sin(half.to_radians() / 2.0) * (1.0 + 1e-9) + 1e-12
+            );
+            aside += f64::from(u8::from(d.dot(Vec3::Y) > 0.0));
+            inside += f64::from(u8::from(d.dot(Vec3::Y.cross(sun.direction())) > 0.0));
+        }
+        let count = f64::from(n * n);
+        assert!((aside / count - 0.5).abs() < 0.02, "{ratio}, {half}, {angle}: {aside}");
+        let beyond = brute_disc(&lobe, angle.to_radians(), half.to_radians(), |_, azimuth| {
+            f64::from(u8::from(azimuth < PI / 2.0))
+        });
+        // the part on the far side of the disc's middle, seen from the mirror direction or toward it: eight cells of samples
+        let near = (inside / count - beyond / truth).abs().min((1.0 - inside / count - beyond / truth).abs());
+        assert!(near < 0.05, "{ratio}, {half}, {angle}: {inside} of {count}, {}", beyond / truth);
     }
 }

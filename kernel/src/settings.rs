@@ -10,8 +10,8 @@ use crate::coupling::word::LONGEST;
 use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::Shape;
 use crate::radiosity::sun_image;
-use crate::scene::Scene;
 use crate::scene::sun::Sun;
+use crate::scene::{NO_MIRROR, Scene};
 use crate::view::chain::ChainSettings;
 
 /// What a caller asks of the stages.
@@ -111,8 +111,13 @@ pub fn beams(
     max_bounces: Option<u32>,
     all_irradiances: bool,
 ) -> Option<BeamSettings> {
-    let diffuse = scene.largest_diffuse() > 0.0 || all_irradiances;
-    if scene.largest_specular() == 0.0 || !diffuse || max_bounces == Some(0) {
+    let mirrors = |lobe: bool| {
+        let is_one = |m: usize| scene.mirror(m) != NO_MIRROR && scene.gloss(m).is_some() == lobe;
+        (0..scene.materials()).any(is_one)
+    };
+    // lobes show what flat mirrors throw on them
+    let wanted = scene.largest_diffuse() > 0.0 || all_irradiances || mirrors(true) && mirrors(false);
+    if scene.largest_specular() == 0.0 || !wanted || max_bounces == Some(0) {
         return None;
     }
     let rays = clamp(100.0 / tolerance, 32768.0, 1e8);

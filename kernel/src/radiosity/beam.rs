@@ -156,7 +156,7 @@ impl Tracer<'_, '_> {
             if toward.dot(surface.normal) > 0.0 {
                 // flux per unit of normal irradiance, the first cosine still to come
                 let (flux, word, arrival) = (scene.areas().at(facet), EMPTY, None);
-                let axis = (!scene.is_smooth()).then_some(-self.sun.direction());
+                let axis = Some(-self.sun.direction());
                 let chain = Chain { index, surface, direction: -toward, flux, word, arrival, axis };
                 rays.set(count, surface.leave(toward));
                 chains.set(count, Some(chain));
@@ -212,7 +212,7 @@ impl Tracer<'_, '_> {
             return Some(None);
         }
         let lobe = mirror.lobe.is_some();
-        chain.axis = chain.axis.filter(|_| !lobe).map(|axis| reflect(axis, surface.normal));
+        chain.axis = chain.axis.zip(surface.flat_mirror(scene)).map(|(axis, normal)| reflect(axis, normal));
         let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
         let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
         let flat = !lobe && !scene.is_smooth();

@@ -124,9 +124,10 @@ impl Surface {
         Some(Mirror { class, lobe: scene.gloss(self.material).and_then(|ratio| Lobe::new(ratio).ok()) })
     }
 
-    /// Whether its material is an ideal mirror.
-    pub fn is_ideal(&self, scene: &Scene<'_>) -> bool {
-        scene.mirror(self.material) != NO_MIRROR && scene.gloss(self.material).is_none()
+    /// The normal of the flat ideal mirror at this point, if it is one.
+    pub fn flat_mirror(&self, scene: &Scene<'_>) -> Option<Vec3> {
+        let ideal = scene.mirror(self.material) != NO_MIRROR && scene.gloss(self.material).is_none();
+        if ideal { scene.flat_normal(self.facet, self.side) } else { None }
     }
 
     /// The direction toward the light for a ray that arrived along `direction`, and the share of the class's

@@ -13,10 +13,11 @@
 
 use crate::base::error::{Error, Field};
 use crate::base::math::{
-    FRAC_PI_2, PI, TAU, Vec3, atan, clamp, cos, exp, fabs, floor, frame, log, sin, sqrt,
+    FRAC_PI_2, PI, TAU, Vec3, asin, atan, clamp, cos, exp, fabs, floor, frame, log, sin, sqrt,
 };
 use crate::base::quadrature::rule;
 use crate::scene::MIRROR_AXIS_RATIO;
+use crate::scene::sun::Sun;
 
 /// The golden ratio's fraction: azimuth step, in turns, of a sunflower's seeds.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
@@ -127,6 +128,13 @@ impl Lobe {
         atan(self.slope(clamp(u, 0.0, 1.0 - 1e-12)))
     }
 
+    /// Share of the whole lobe's energy within an angle of the mirror direction: the inverse of [`Lobe::cone`].
+    fn energy_within(&self, angle: f64) -> f64 {
+        let sine = if angle < FRAC_PI_2 { sin(angle) } else { 1.0 };
+        let square = sine * sine;
+        PI * self.peak * square * log_slope((self.ratio - 1.0) * (self.ratio + 1.0) * square)
+    }
+
     /// A direction of the lobe above the facet for (`u`, `v`) in the unit square, with equal energy per area:
     /// the mean of f over n well-spread samples, times the albedo, tends to the integral of f q/rho_0 over
     /// the directions above the facet.
@@ -230,6 +238,126 @@ impl Lobe {
         let inverse = 1.0 / self.ratio;
         let (a, b) = (sqrt(x * x + inverse * inverse), sqrt(x * x + 1.0));
         (a, (1.0 - inverse) * (1.0 + inverse) / (a * (a + b)))
+    }
+}
+
+/// Sine of a disc's half angle, over the lobe's width there, below which its middle stands for the disc: their values differ
+/// by less than half the square of this.
+const POINT: f64 = 3e-3;
+
+/// Points of the integral over a disc's edge: relative error 1e-5 where the mirror direction points to the very edge, else
+/// below 1e-6.
+const EDGE_POINTS: usize = 8;
+
+/// A lobe against a disc of uniform radiance: the sun's, seen straight or mirrored.
+///
+/// Along a circle about the mirror direction the lobe is constant, and the share of its energy within a circle is a closed
+/// form. What the disc takes of it is therefore an integral of the arc of each circle inside the disc over that share,
+/// u; with u = low + span (1 - cos t)/2 it has no root at either end.
+#[derive(Clone, Copy, Debug)]
+pub struct Highlight {
+    lobe: Lobe,
+    mirror: Vec3,
+    /// At right angles to it, toward the disc's middle, and to both.
+    axes: (Vec3, Vec3),
+    /// Angle from the mirror direction to the disc's middle, and the disc's half angle.
+    angle: f64,
+    half: f64,
+    /// Energy of the circles that are wholly inside, and where those begin that are partly.
+    inside: f64,
+    low: f64,
+    span: f64,
+    /// Energy of the parts of the others, in the order of the points.
+    parts: [f64; EDGE_POINTS],
+    /// Energy in the disc.
+    energy: f64,
+    /// Mean of q/rho_0 over the disc.
+    pub value: f64,
+}
+
+impl Highlight {
+    /// The lobe about the unit vector `mirror` against the sun's disc; `None` where the disc's middle stands for all of it.
+    pub fn new(lobe: &Lobe, mirror: Vec3, sun: &Sun<'_>) -> Option<Highlight> {
+        let half = sun.half_angle();
+        let apart = mirror - sun.direction();
+        let angle = 2.0 * asin((0.5 * sqrt(apart.dot(apart))).min(1.0));
+        let excess = (lobe.ratio - 1.0) * (lobe.ratio + 1.0);
+        let width2 = 1.0 + excess * sin(angle) * sin(angle);
+        if half == 0.0 || half * half * lobe.ratio * lobe.ratio < POINT * POINT * width2 {
+            return None;
+        }
+        let aside = sun.direction() - mirror * mirror.dot(sun.direction());
+        let length = sqrt(aside.dot(aside));
+        let first = if length > 0.0 { aside / length } else { frame(mirror).0 };
+        let (nearest, farthest) = (fabs(angle - half), angle + half);
+        let low = lobe.energy_within(nearest);
+        let mut highlight = Highlight {
+            lobe: *lobe,
+            mirror,
+            axes: (first, mirror.cross(first)),
+            angle,
+            half,
+            inside: if angle < half { low } else { 0.0 },
+            low,
+            span: lobe.energy_within(farthest) - low,
+            parts: [0.0; EDGE_POINTS],
+            energy: 0.0,
+            value: 0.0,
+        };
+        let (nodes, weights) = rule(EDGE_POINTS);
+        let mut energy = highlight.inside;
+        for (n, (t, weight)) in nodes.iter().zip(weights).enumerate() {
+            let arc = highlight.arc(highlight.cone(*t));
+            let part = 0.5 * PI * sin(PI * t) * weight * highlight.span * arc;
+            highlight.parts[n % EDGE_POINTS] = part;
+            energy += part;
+        }
+        let sine = sin(half);
+        (highlight.energy, highlight.value) = (energy, energy / (PI * sine * sine));
+        Some(highlight)
+    }
+
+    /// Angle of the circle at a place in 0..=1 between the first and the last that is partly inside.
+    fn cone(&self, t: f64) -> f64 {
+        self.lobe.cone(self.low + 0.5 * self.span * (1.0 - cos(PI * t)))
+    }
+
+    /// Share of the circle of an angle about the mirror direction that is inside the disc.
+    fn arc(&self, cone: f64) -> f64 {
+        let (a, b) = (sin(0.5 * (self.half + cone - self.angle)), sin(0.5 * (self.half - cone + self.angle)));
+        let (rise, most) = (a * b, sin(cone) * sin(self.angle));
+        if rise <= 0.0 {
+            0.0
+        } else if rise >= most {
+            1.0
+        } else {
+            2.0 * asin(sqrt(rise / most)) / PI
+        }
+    }
+
+    /// A direction of the disc for (`u`, `v`) in the unit square, as dense as the lobe is high there.
+    pub fn sample(&self, u: f64, v: f64) -> Vec3 {
+        let mut rest = u * self.energy;
+        let (cone, arc) = if rest < self.inside {
+            (self.lobe.cone(rest), 1.0)
+        } else {
+            rest -= self.inside;
+            let mut place = 1.0;
+            let mut start = 0.0;
+            for (part, weight) in self.parts.iter().zip(rule(EDGE_POINTS).1) {
+                if rest < *part {
+                    place = start + weight * (rest / part);
+                    break;
+                }
+                rest -= part;
+                start += weight;
+            }
+            let cone = self.cone(place.min(1.0));
+            (cone, self.arc(cone))
+        };
+        let turn = PI * arc * (2.0 * v - 1.0);
+        let (first, second) = self.axes;
+        self.mirror * cos(cone) + (first * cos(turn) + second * sin(turn)) * sin(cone)
     }
 }
 

@@ -194,6 +194,9 @@ pub struct Path {
     pub variance: f64,
     /// Expected error from sampling lobes, relative to the reference radiance.
     pub noise: f64,
+    /// What n rays like this one miss of highlights that are seen in lobes, times n: the geometric mean of the brightest
+    /// that the ray has met and of how bright it is at its middle, relative to the reference radiance.
+    pub glare: f64,
     /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
     pub sampled: bool,
 }
@@ -276,8 +279,10 @@ struct Leg<'w> {
     mirrors: u32,
     /// Lobes among them.
     lobes: u32,
-    /// True where the last mirror was a lobe, whose sunlight is evaluated directly.
+    /// True where sunlight that the ray may bring is evaluated directly at the last lobe.
     lobe: bool,
+    /// True where that is so behind flat mirrors, too.
+    imaged: bool,
     /// Length of the way up to its ray.
     far: f64,
     /// True where the sun's disc does not count.
@@ -350,7 +355,8 @@ impl Fan<'_> {
         let n = f64::from(self.count.max(1));
         let (seen, between) =
             (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), BETWEEN * through / n);
-        sqrt(seen * seen + between * between)
+        let glare = self.path.glare / n;
+        sqrt(seen * seen + between * between + glare * glare)
     }
 
     /// Adds the mean of all rays.
@@ -406,6 +412,7 @@ impl Solved<'_> {
             mirrors: 0,
             lobes: 0,
             lobe: false,
+            imaged: false,
             far: 0.0,
             sunless,
             images,
@@ -461,7 +468,8 @@ impl Solved<'_> {
                 return None;
             }
             leg.mirrors += 1;
-            leg.lobe = mirror.lobe.is_some();
+            leg.lobe =
+                mirror.lobe.is_some() || leg.lobe && leg.imaged && surface.flat_mirror(self.scene).is_some();
             match &mirror.lobe {
                 None => {
                     let direction = surface.mirrored(self.scene, leg.ray.direction);
@@ -479,7 +487,8 @@ impl Solved<'_> {
                     }
                 }
                 Some(_) => {
-                    self.add_sun_gloss(leg, &surface, &mirror, terms);
+                    self.add_sun_gloss(leg, &surface, &mirror, how, terms, path);
+                    leg.imaged = self.knows_images(&surface);
                     leg.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
@@ -551,7 +560,7 @@ impl Solved<'_> {
                 self.add_ray(leg, surface.leave(direction), how, fan);
             }
             if asked.is_none() {
-                goal = self.all_rays(fan.spread(self.reference));
+                goal = self.all_rays(fan.spread(self.reference), fan.path.glare);
             }
         }
         path.noise += fan.error(self.reference, largest);
@@ -565,9 +574,10 @@ impl Solved<'_> {
         (wanted.min(MOST_LOBE_RAYS) as u32).max(FEWEST_LOBE_RAYS)
     }
 
-    /// Rays of both sets, by the standard deviation of the first one's.
-    fn all_rays(&self, spread: f64) -> u32 {
-        let wanted = pow(LOBE_ERROR * spread / (LOBE_GOAL * self.settings.tolerance), 1.0 / LOBE_POWER);
+    /// Rays of both sets, by the standard deviation of the first one's and their glare.
+    fn all_rays(&self, spread: f64, glare: f64) -> u32 {
+        let goal = LOBE_GOAL * self.settings.tolerance;
+        let wanted = pow(LOBE_ERROR * spread / goal, 1.0 / LOBE_POWER).max(glare / goal);
         wanted.min(MOST_LOBE_RAYS) as u32
     }
 
@@ -581,12 +591,13 @@ impl Solved<'_> {
         let sample = Sample::OneOf { seed: how.sample.seed(), index: fan.count };
         let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
         let hit = self.bvh.closest(&ray);
-        let (mirrors, lobes, far, gathered) = (leg.mirrors, leg.lobes, leg.far, leg.gathered.take());
+        let Leg { mirrors, lobes, far, imaged, .. } = *leg;
+        let gathered = leg.gathered.take();
         (leg.ray, leg.lobe) = (ray, true);
         core::mem::swap(&mut leg.through, &mut fan.through);
         self.follow(leg, hit, &mut how, fan.terms, &mut fan.path);
         core::mem::swap(&mut leg.through, &mut fan.through);
-        (leg.mirrors, leg.lobes, leg.far, leg.gathered) = (mirrors, lobes, far, gathered);
+        (leg.mirrors, leg.lobes, leg.far, leg.imaged, leg.gathered) = (mirrors, lobes, far, imaged, gathered);
         for (b, (square, before)) in fan.squares.iter_mut().zip(fan.before.iter()).enumerate().take(bands) {
             let value = fan.terms.sum(b) - before;
             *square += value * value;

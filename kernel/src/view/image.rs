@@ -675,7 +675,7 @@ impl<'a> Painter<'a, '_> {
         self.board.sums.clear(bands);
         self.board.squares.head_mut(bands).fill(0.0);
         let (mut n, mut goal) = (0u32, FEWEST);
-        let (mut error, mut ahead) = (0.0, AnswerBuffer::default());
+        let (mut error, mut glare, mut ahead) = (0.0, 0.0f64, AnswerBuffer::default());
         while n < goal {
             let camera = &self.camera;
             let any = |n: u32| {
@@ -688,6 +688,7 @@ impl<'a> Painter<'a, '_> {
             let of = Sample::OneOf { seed, index: n };
             let Board { terms, work, .. } = &mut *self.board;
             let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.outlook);
+            glare = glare.max(path.glare);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             let Board { terms, sums, squares, .. } = &mut *self.board;
@@ -709,6 +710,7 @@ impl<'a> Painter<'a, '_> {
                 }
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
                 error = SCATTERED * spread.max(UNSEEN * contrast * sqrt(share)) * pow(share, 0.75);
+                error = error.max(glare * share);
                 if error > wanted && goal < MOST {
                     goal *= 2;
                 }

@@ -205,7 +205,7 @@ impl Solved<'_> {
         GATHERS
     }
 
-    fn knows_images(&self, surface: &Surface) -> bool {
+    pub(super) fn knows_images(&self, surface: &Surface) -> bool {
         let side = surface.facet * self.scene.sides() + surface.side;
         self.images.are_known(self.elements.facet_sides(), side)
     }
@@ -321,6 +321,7 @@ impl Solved<'_> {
             mirrors: spot.bounces + 1,
             lobes: 0,
             lobe: false,
+            imaged: false,
             far: 0.0,
             sunless: true,
             images,

@@ -169,7 +169,8 @@ impl Solved<'_> {
         if side >= self.scene.sides() {
             return false;
         }
-        let mirrored = reflect(axis, self.scene.side_normal(facet, side));
+        let Some(normal) = self.scene.flat_normal(facet, side) else { return false };
+        let mirrored = reflect(axis, normal);
         let place = facet * self.scene.sides() + side;
         1.0 - mirrored.dot(sun.direction()) < SAME
             || self.images.may_show(self.elements.facet_sides(), place, mirrored)

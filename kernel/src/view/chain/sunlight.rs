@@ -3,12 +3,13 @@
 use super::outlook::{Toward, may_meet};
 use super::{How, Leg, Path, Sample, Solved, Terms};
 use crate::base::index::{Index, IndexMut};
-use crate::base::math::{FRAC_1_PI, Vec3, pow, reflect, sqrt};
+use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::word::LONGEST;
 use crate::radiosity::sun_image::{CUTOFF, SAME};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
+use crate::scene::lobe::{Highlight, Lobe};
 use crate::scene::sun::Sun;
 
 /// Most rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them
@@ -21,6 +22,9 @@ const DISC_ERROR: f64 = 0.25;
 
 /// Penumbrae that these rays leave less wrong, in tolerances, need no others.
 const SAMPLED: f64 = 0.1;
+
+/// The most times as many where more than the reference radiance is at stake.
+const MOST_TIMES: f64 = 32.0;
 
 /// The most rays toward the sun's disc.
 const MOST_DISC_RAYS: u32 = 1024;
@@ -48,18 +52,24 @@ impl Solved<'_> {
         }
         let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
         let mut lit = 0.0;
-        let all = self.over_disc(sun, at_stake, surface, how.sample, path, |path, toward, share| {
-            let ray = surface.leave(toward);
-            let seen = match known {
-                Some([]) => true,
-                Some(known) => self.bvh.closest_among(&ray, known).is_none(),
-                None => !self.bvh.occluded(&ray),
-            };
-            path.rays += u32::from(known.is_none_or(|k| !k.is_empty()));
+        let disc = Disc::OnPlane(sun, surface.normal);
+        let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+            let seen = self.sees_sun(surface, toward, known, path);
             lit += if seen { share } else { 0.0 };
             seen
         });
         if all > 0.0 { cosine * (lit / all) } else { 0.0 }
+    }
+
+    /// Whether nothing stands before a point in a direction; `known` is all that may, if that is known.
+    fn sees_sun(&self, surface: &Surface, toward: Vec3, known: Option<&[u32]>, path: &mut Path) -> bool {
+        let ray = surface.leave(toward);
+        path.rays += u32::from(known.is_none_or(|k| !k.is_empty()));
+        match known {
+            Some([]) => true,
+            Some(known) => self.bvh.closest_among(&ray, known).is_none(),
+            None => !self.bvh.occluded(&ray),
+        }
     }
 
     /// Calls `ray` with directions toward the sun and their shares until it is known well enough, for what is at stake,
@@ -67,15 +77,14 @@ impl Solved<'_> {
     #[inline]
     fn over_disc(
         &self,
-        sun: &Sun<'_>,
+        disc: &Disc<'_>,
         at_stake: f64,
-        surface: &Surface,
         sample: Sample,
         path: &mut Path,
         mut ray: impl FnMut(&mut Path, Vec3, f64) -> bool,
     ) -> f64 {
-        if sun.is_point() {
-            ray(path, sun.direction(), 1.0);
+        if let Some(toward) = disc.point() {
+            ray(path, toward, 1.0);
             return 1.0;
         }
         // other coordinates than those of the place in the pixel: the same ones of another sequence are correlated with
@@ -92,8 +101,7 @@ impl Solved<'_> {
         let (mut lit, mut all) = (0.0, 0.0);
         while count < goal {
             let (u, v) = sequence.pair(count, coordinate);
-            let toward = sun.sample(u, v);
-            let share = sun.share(toward, surface.normal);
+            let (toward, share) = disc.sample(u, v);
             count += 1;
             if share > 0.0 {
                 all += share;
@@ -102,12 +110,10 @@ impl Solved<'_> {
             if count == goal && lit != 0.0 && lit != all {
                 let part = lit / all;
                 let error = at_stake * sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
-                if matches!(sample, Sample::Alone(_))
-                    && count < MOST_DISC_RAYS
-                    && error > self.settings.tolerance
-                {
+                let alone = matches!(sample, Sample::Alone(_));
+                if alone && count < MOST_DISC_RAYS && error > self.settings.tolerance {
                     goal *= 2;
-                } else if error > SAMPLED * self.settings.tolerance {
+                } else if !alone && error > SAMPLED * self.settings.tolerance {
                     path.sampled = true;
                 } else {
                     path.noise += error;
@@ -120,6 +126,8 @@ impl Solved<'_> {
     /// Rays toward the sun's disc to begin with.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
+        // what a highlight brings may be many times the reference radiance: an edge across the disc then shows far out
+        let most = (f64::from(most) * clamp(at_stake, 1.0, MOST_TIMES)) as u32;
         let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.tolerance);
         (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
@@ -163,7 +171,8 @@ impl Solved<'_> {
             let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
             let [lit, products] = &mut *leg.images;
             lit.head_mut(bands).fill(0.0);
-            let all = self.over_disc(&image, at_stake, surface, how.sample, path, |path, toward, share| {
+            let disc = Disc::OnPlane(&image, surface.normal);
+            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
                 let seen = self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
                 if seen {
                     lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
@@ -220,9 +229,9 @@ impl Solved<'_> {
                 return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SAME;
             };
             let Some(surface) = Surface::of_hit(self.scene, &hit) else { return false };
-            if mirrors >= most || !surface.is_ideal(self.scene) {
+            let Some(normal) = surface.flat_mirror(self.scene).filter(|_| mirrors < most) else {
                 return false;
-            }
+            };
             let mut largest = 0.0;
             for (product, rho) in products.iter_mut().zip(self.scene.specular(surface.material)) {
                 *product *= rho;
@@ -233,28 +242,145 @@ impl Solved<'_> {
                 return false;
             }
             mirrors += 1;
-            axis = reflect(axis, surface.normal);
+            axis = reflect(axis, normal);
             let (sides, side) =
                 (self.elements.facet_sides(), surface.facet * self.scene.sides() + surface.side);
             if 1.0 - axis.dot(sun.direction()) >= SAME && !self.images.may_show(sides, side, axis) {
                 // what this mirror shows is no image of the sun
                 return false;
             }
-            ray = surface.leave(reflect(ray.direction, surface.normal));
+            ray = surface.leave(surface.mirrored(self.scene, ray.direction));
         }
     }
 
-    /// The sun in a lobe, evaluated directly: E q(sun, view) V.
-    #[cfg_attr(target_pointer_width = "32", inline(never))]
-    pub(super) fn add_sun_gloss(&self, leg: &Leg<'_>, surface: &Surface, mirror: &Mirror, terms: &mut Terms) {
+    /// The sun and its images in a lobe, evaluated directly: E q(sun, view) V, the mean over the disc.
+    #[inline(never)]
+    pub(super) fn add_sun_gloss(
+        &self,
+        leg: &mut Leg<'_>,
+        surface: &Surface,
+        mirror: &Mirror,
+        how: &mut How<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
-        let toward: Vec3 = sun.direction();
-        if toward.dot(surface.normal) <= 0.0 || self.bvh.occluded(&surface.leave(toward)) {
+        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
+        let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
+        let bands = self.shape.bands;
+        if shows(sun) {
+            let known = how.outlook.before(self, surface, Toward::Sun, (sun.direction(), sun.half_angle()));
+            let [lit, _] = &mut *leg.images;
+            lit.head_mut(bands).fill(0.0);
+            let (disc, value) = Disc::of_lobe(lobe, mirrored, sun);
+            let at_stake = value * self.gloss_at_stake(leg.through, sun);
+            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+                let seen = toward.dot(surface.normal) > 0.0 && self.sees_sun(surface, toward, known, path);
+                lit.head_mut(bands).iter_mut().for_each(|sum| *sum += if seen { share } else { 0.0 });
+                seen
+            });
+            self.add_highlight(leg, (sun, value, all), terms);
+            self.glare(leg, lobe, (value, at_stake), path);
+        }
+        let side = surface.facet * self.scene.sides() + surface.side;
+        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors));
+        for (n, axis) in (0..).zip(self.images.of(self.elements.facet_sides(), side)) {
+            let image = sun.seen_toward(axis);
+            if !shows(&image) {
+                continue;
+            }
+            let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
+            if known.is_some_and(|mirrors| !self.any_may_show(mirrors, surface.point, axis, sun)) {
+                continue;
+            }
+            let [lit, products] = &mut *leg.images;
+            lit.head_mut(bands).fill(0.0);
+            let (disc, value) = Disc::of_lobe(lobe, mirrored, &image);
+            let at_stake = value * self.gloss_at_stake(leg.through, sun);
+            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+                let seen = toward.dot(surface.normal) > 0.0
+                    && self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
+                if seen {
+                    lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
+                }
+                seen
+            });
+            self.add_highlight(leg, (sun, value, all), terms);
+            self.glare(leg, lobe, (value, at_stake), path);
+        }
+    }
+
+    /// Notes a highlight that other rays of a lobe may meet nearer to its middle. Directions in which it is brighter than
+    /// some value are as many as the inverse of that, so that the brightest of n rays tells what the rest of it brings.
+    fn glare(&self, leg: &Leg<'_>, lobe: &Lobe, (value, brought): (f64, f64), path: &mut Path) {
+        if leg.lobes > 0 && value > 0.0 && leg.images[0].head(self.shape.bands).iter().any(|lit| *lit > 0.0) {
+            path.glare = path.glare.max(brought * sqrt(lobe.value(1.0) / value));
+        }
+    }
+
+    /// What a highlight of the value 1 brings to a chain, relative to the reference radiance.
+    fn gloss_at_stake(&self, through: &[f64; MAX_BANDS], sun: &Sun<'_>) -> f64 {
+        let mut largest: f64 = 0.0;
+        for (band, (through, reference)) in through.iter().zip(self.reference).enumerate() {
+            let value = through * sun.irradiance(band);
+            largest = if value > 0.0 { largest.max(value / reference) } else { largest };
+        }
+        largest
+    }
+
+    /// Adds a highlight of which `leg.images` holds the lit share of `all`.
+    fn add_highlight(&self, leg: &Leg<'_>, (sun, value, all): (&Sun<'_>, f64, f64), terms: &mut Terms) {
+        if all <= 0.0 {
             return;
         }
-        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
-        let value = lobe.value(mirrored.dot(toward));
-        let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(self.shape.bands);
-        own.enumerate().for_each(|(band, (to, through))| *to += through * sun.irradiance(band) * value);
+        let own = terms.mirror_sky.iter_mut().zip(leg.through.iter().zip(&leg.images[0]));
+        for (band, (to, (through, lit))) in own.enumerate().take(self.shape.bands) {
+            *to += through * sun.irradiance(band) * value * (lit / all);
+        }
+    }
+}
+
+/// The sun's disc, or an image of it, as rays toward it are spread.
+enum Disc<'a> {
+    /// Evenly, each by its share of the irradiance of a plane of this normal.
+    OnPlane(&'a Sun<'a>, Vec3),
+    /// As dense as a lobe is high.
+    InLobe(Highlight),
+    /// Evenly, in a lobe that is the same all over it.
+    Even(Sun<'a>),
+}
+
+impl<'a> Disc<'a> {
+    /// The disc in a lobe about the direction `mirrored`, and the mean of q/rho_0 over it.
+    fn of_lobe(lobe: &Lobe, mirrored: Vec3, sun: &Sun<'a>) -> (Disc<'a>, f64) {
+        match Highlight::new(lobe, mirrored, sun) {
+            Some(highlight) => {
+                let value = highlight.value;
+                (Disc::InLobe(highlight), value)
+            }
+            None => (Disc::Even(*sun), lobe.value(mirrored.dot(sun.direction()))),
+        }
+    }
+
+    /// The direction toward a point.
+    fn point(&self) -> Option<Vec3> {
+        match self {
+            Disc::OnPlane(sun, _) => sun.is_point().then(|| sun.direction()),
+            Disc::Even(sun) => sun.is_point().then(|| sun.direction()),
+            Disc::InLobe(_) => None,
+        }
+    }
+
+    /// A direction for a point of the unit square, and its share; 0 or more.
+    #[inline]
+    fn sample(&self, u: f64, v: f64) -> (Vec3, f64) {
+        match self {
+            Disc::OnPlane(sun, normal) => {
+                let toward = sun.sample(u, v);
+                (toward, sun.share(toward, *normal))
+            }
+            Disc::InLobe(highlight) => (highlight.sample(u, v), 1.0),
+            Disc::Even(sun) => (sun.sample(u, v), 1.0),
+        }
     }
 }
