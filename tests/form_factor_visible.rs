@@ -178,3 +178,63 @@ proptest! {
         }
     }
 }
+
+/// The same in another place: turned and moved.
+fn turned(points: &[Vec3], number: usize) -> Vec<Vec3> {
+    let angle = number as f64;
+    let turn = glam::DQuat::from_axis_angle(v(0.3, angle.sin(), 0.9 * angle.cos()).normalize(), angle);
+    points.iter().map(|p| turn * *p + v(angle, -0.5 * angle, 0.1)).collect()
+}
+
+fn triangles(points: &[Vec3]) -> Vec<[Vec3; 3]> {
+    points.chunks(3).map(|t| [t[0], t[1], t[2]]).collect()
+}
+
+/// Unit squares face to face at distance g, a wall across all of the gap at x = w: each side sees its own half, all four
+/// rectangles unobstructed and in closed form.
+#[test]
+fn a_wall_on_the_plane_parts_what_it_stands_on() {
+    for number in 0..14 {
+        let w = 0.1 + 0.8 * (0.37 + 0.618 * number as f64).fract();
+        let gap = [1.0, 0.3, 0.05, 2.0][number % 4];
+        let rectangle = |x: [f64; 2], z: f64| level(x, [0.0, 1.0], z).0.to_vec();
+        let facing = |x: [f64; 2]| rectangle(x, gap).into_iter().rev().collect::<Vec<_>>();
+        // on the plane, or through it
+        let foot = if number % 2 == 0 { 0.0 } else { -0.4 };
+        let wall = [
+            [v(w, -1.0, foot), v(w, 2.0, foot), v(w, 2.0, gap)],
+            [v(w, -1.0, foot), v(w, 2.0, gap), v(w, -1.0, gap)],
+        ];
+        let part = |x: [f64; 2]| (x[1] - x[0]) * polygon_to_polygon(&rectangle(x, 0.0), &facing(x));
+        let truth = part([0.0, w]) + part([w, 1.0]);
+        let [a, b] = [turned(&rectangle([0.0, 1.0], 0.0), number), turned(&facing([0.0, 1.0]), number)];
+        let wall = triangles(&turned(wall.as_flattened(), number));
+        let mut scratch = vec![Convex::EMPTY; 256];
+        for (from, to) in [(&a, &b), (&b, &a)] {
+            let got = visible_polygon_to_polygon(from, to, &wall, 1e-6, &mut scratch).unwrap();
+            println!("{number}: {:.9}, off {:.1e}, error {:.1e}", got.value, got.value - truth, got.error);
+            assert!((got.value - truth).abs() <= got.error.max(1e-9), "{number}: {}, not {truth}", got.value);
+        }
+    }
+}
+
+/// A plate that leans from an edge of the lower square through the upper one: what lies beyond its line on that shows.
+#[test]
+fn a_leaning_plate_hides_one_side_of_its_line() {
+    for number in 0..12 {
+        let gap = [0.05, 0.2, 0.5][number % 3];
+        let slope = (0.1 + 0.8 * (0.2 + 0.618 * number as f64).fract()) / gap;
+        let plate = [v(-50.0, 0.0, 0.0), v(50.0, 0.0, 0.0), v(0.0, 20.0 * slope, 20.0)];
+        let low = level([0.0, 1.0], [0.0, 1.0], 0.0).0.to_vec();
+        let high = |y: f64| level([0.0, 1.0], [y, 1.0], gap).0.into_iter().rev().collect::<Vec<_>>();
+        let truth = polygon_to_polygon(&low, &high(gap * slope));
+        let [a, b] = [turned(&low, number), turned(&high(0.0), number)];
+        let plate = triangles(&turned(&plate, number));
+        let mut scratch = vec![Convex::EMPTY; 256];
+        for (from, to) in [(&a, &b), (&b, &a)] {
+            let got = visible_polygon_to_polygon(from, to, &plate, 1e-6, &mut scratch).unwrap();
+            println!("{number}: {:.9}, off {:.1e}, error {:.1e}", got.value, got.value - truth, got.error);
+            assert!((got.value - truth).abs() <= got.error.max(1e-9), "{number}: {}, not {truth}", got.value);
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Form factors with opaque triangles in the path.
 
-use super::convex::{Convex, double_area, edges, pieces};
+use super::convex::{CAPACITY, Convex, double_area, edges, pieces};
 use super::pair::{fronts, polygon_to_polygon};
 use super::patch::{HalvingPath, Patch, patches};
 use super::point::point_to_polygon;
@@ -113,7 +113,8 @@ fn visible(
                 continue;
             };
             let mut mean = Mean { normal, size, target, occluders, tolerance: 0.25 * tolerance, scratch };
-            for patch in patches(receiver.corners()) {
+            let (parts, count) = cut_along_traces(&receiver, normal, occluders);
+            for patch in parts.iter().take(count).flat_map(|part| patches(part.corners())) {
                 let coarse = mean.over(&patch)?;
                 let part = mean.refined(&patch, coarse)?;
                 value += part.value;
@@ -123,6 +124,45 @@ fn visible(
     }
     Ok(Estimate { value, error })
 }
+
+/// The most parts of a receiver.
+const PARTS: usize = if cfg!(feature = "std") { 64 } else { 8 };
+
+/// Cuts a receiver along the lines in which occluders stand on its plane or pass it: what is visible jumps there.
+#[inline(never)]
+fn cut_along_traces(receiver: &Convex, normal: Vec3, occluders: &[[Vec3; 3]]) -> ([Convex; PARTS], usize) {
+    let (mut parts, mut count) = ([Convex::EMPTY; PARTS], 1);
+    parts.set(0, *receiver);
+    let Some(base) = receiver.corners().first() else { return (parts, 0) };
+    for occluder in occluders {
+        let Some(across) = unit(double_area(occluder)) else { continue };
+        let reach = occluder.iter().map(|c| (*c - *base).abs().max_element()).fold(0.0, f64::max);
+        let tolerance = TRACE * reach;
+        let heights = occluder.map(|c| (c - *base).dot(normal));
+        let on = heights.iter().filter(|h| h.abs() <= tolerance).count();
+        let crosses = heights.iter().any(|h| *h > tolerance) && heights.iter().any(|h| *h < -tolerance);
+        // a corner that touches leaves no line, and what lies in the plane hides nothing
+        if on == 3 || on < 2 && !crosses {
+            continue;
+        }
+        let beside = |c: Vec3| (c - occluder[0]).dot(across);
+        for at in 0..count {
+            let Some(part) = parts.get(at).copied() else { continue };
+            let [one, other] = [part.clip(beside, tolerance), part.clip(|c| -beside(c), tolerance)];
+            if one.is_empty() || other.is_empty() || count == PARTS || part.corners().len() + 2 > CAPACITY {
+                continue;
+            }
+            parts.set(at, one);
+            parts.set(count, other);
+            count += 1;
+        }
+    }
+    (parts, count)
+}
+
+/// Corners of occluders that come this near to the receiver's plane stand on it, as a share of the distance: coordinates
+/// that were turned are off by some roundings.
+const TRACE: f64 = 1e-12;
 
 /// The directions that a convex occluder hides: those on the positive side of all planes through the point.
 struct Shadow {
