@@ -1731,6 +1731,15 @@ typedef struct blik_signature {
      * (mean radiance - background)/background; 0 where the background is 0.
      */
     double contrast;
+    /**
+     * What the radiant intensity is expected to be wrong by, W/sr.
+     */
+    double error;
+    /**
+     * Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr; not
+     * among the error.
+     */
+    double unresolved_glints;
 } blik_signature;
 
 #ifdef __cplusplus

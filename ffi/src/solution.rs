@@ -12,10 +12,10 @@ use blik_kernel::chain::Solved;
 use blik_kernel::light::{self, Light};
 use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::scene::MAX_BANDS;
+use blik_kernel::sky::SkyInput;
 use blik_kernel::sky::record::SkyRecord;
-use blik_kernel::sky::{Sky, SkyInput};
 use blik_kernel::stages::{Beams, Lighting, Sizes};
-use blik_kernel::sun::{Sun, SunInput};
+use blik_kernel::sun::SunInput;
 use core::ffi::c_void;
 
 /// A solved scene in memory. Read-only once made: any number of threads may use it at once.
@@ -164,10 +164,7 @@ impl Given<'_> {
 
     /// The kernel's light, checked.
     fn light(&self, bands: usize) -> Result<Light<'_>, Error> {
-        Ok(Light {
-            sky: self.sky.as_ref().map(|s| Sky::new(s, bands)).transpose()?,
-            sun: self.sun.as_ref().map(|s| Sun::new(s, bands)).transpose()?,
-        })
+        Light::new(self.sky.as_ref(), self.sun.as_ref(), bands)
     }
 }
 
@@ -246,10 +243,7 @@ fn build(
     let mut arena = Arena::new(rest, 0)?;
     let (sky, sun) = keep(given, &plan, &mut arena)?;
     let (scene, elements) = (&coupling.base.scene, &coupling.elements);
-    let light = Light {
-        sky: sky.as_ref().map(|s| Sky::new(s, scene.bands())).transpose()?,
-        sun: sun.as_ref().map(|s| Sun::new(s, scene.bands())).transpose()?,
-    };
+    let light = Light::new(sky.as_ref(), sun.as_ref(), scene.bands())?;
     let mut solution = plan.sizes.solution.take(&mut arena)?;
     let mut scratch = plan.sizes.take_scratch(&mut arena)?;
     let beam_memory = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;

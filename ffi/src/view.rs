@@ -465,6 +465,11 @@ pub struct blik_signature {
     pub background: f64,
     /// (mean radiance - background)/background; 0 where the background is 0.
     pub contrast: f64,
+    /// What the radiant intensity is expected to be wrong by, W/sr.
+    pub error: f64,
+    /// Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr; not
+    /// among the error.
+    pub unresolved_glints: f64,
 }
 
 /// Cells along a side of a view.
@@ -538,13 +543,16 @@ fn measure(
         sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
     for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
-        let own = Signature::new(sums, band, background);
+        let reference = solution.solved().reference.get(band).copied().unwrap_or(0.0);
+        let own = Signature::new(sums, band, reference, background);
         *out = blik_signature {
             radiant_intensity: own.intensity,
             projected_area: sums.area,
             mean_radiance: own.mean_radiance,
             background,
             contrast: own.contrast.unwrap_or(0.0),
+            error: own.error,
+            unresolved_glints: own.unresolved,
         };
     }
     Ok(())

@@ -27,7 +27,7 @@ use crate::scene::{MAX_BANDS, Scene};
 use crate::settings::{self, Settings};
 
 /// Version of the layout; another one is refused.
-pub const VERSION: u64 = 3;
+pub const VERSION: u64 = 4;
 
 /// "BLIKBAKE"; its bytes tell the byte order.
 const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");
@@ -324,9 +324,6 @@ impl<'m> Solution<'m> {
 
     /// The kernel's light.
     pub fn light(&self, bands: usize) -> Result<light::Light<'m>, Error> {
-        Ok(light::Light {
-            sky: self.sky.as_ref().map(|s| Sky::new(s, bands)).transpose()?,
-            sun: self.sun.as_ref().map(|s| Sun::new(s, bands)).transpose()?,
-        })
+        light::Light::new(self.sky.as_ref(), self.sun.as_ref(), bands)
     }
 }

@@ -153,12 +153,28 @@ impl Record {
 
     /// A target on which the sun shines from the direction `image` (as the radiosity wing packs it; 0: by lobes or curved
     /// mirrors).
-    pub fn beam((unknown, _): (usize, Local), word: u16, weight: f64, image: u64) -> Record {
+    pub fn beam((unknown, (a, b)): (usize, Local), word: u16, weight: f64, image: u64) -> Record {
         // records of different images stay apart
         let apart = image.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 50;
         let checks = [48, 32, 16, 0].map(|shift| f32::from((image >> shift) as u16));
         let key = (unknown as u64 | apart << 32) << 16 | u64::from(word);
-        Record { key, weight, gradient: [0.0; 2], checks, moment: [0.0; 2] }
+        // where on the element it falls: weighted sums of the place, of its squared distance from the middle, and a count
+        let gradient = [weight * a, weight * b].map(|x| x as f32);
+        Record { key, weight, gradient, checks, moment: [(weight * (a * a + a * b + b * b)) as f32, 1.0] }
+    }
+
+    /// The same with `share` of the weight.
+    pub fn scaled_beam(self, share: f64) -> Record {
+        let scaled = |x: f32| (share * f64::from(x)) as f32;
+        let [square, count] = self.moment;
+        let gradient = self.gradient.map(scaled);
+        Record { weight: share * self.weight, gradient, moment: [scaled(square), count], ..self }
+    }
+
+    /// A beam's sums of places, of their squared distances from the middle, and its count, all weighted but the last.
+    pub fn places(&self) -> [f32; 4] {
+        let ([a, b], [square, count]) = (self.gradient, self.moment);
+        [a, b, square, count]
     }
 
     /// The image of a beam.
@@ -184,7 +200,11 @@ impl Record {
     /// Adds up what two rays of a beam brought.
     pub fn join_beam(&mut self, record: &Record) -> bool {
         let same = self.key == record.key && self.checks == record.checks;
-        self.weight += if same { record.weight } else { 0.0 };
+        if same {
+            self.weight += record.weight;
+            self.gradient.iter_mut().zip(record.gradient).for_each(|(to, from)| *to += from);
+            self.moment.iter_mut().zip(record.moment).for_each(|(to, from)| *to += from);
+        }
         same
     }
 

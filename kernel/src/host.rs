@@ -25,8 +25,8 @@ use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize
 use crate::radiosity::sun_image::SunImages;
 use crate::rays::bvh::Bvh;
 use crate::scene::light::{self, Light};
-use crate::scene::sky::{Sky, SkyInput};
-use crate::scene::sun::{Sun, SunInput};
+use crate::scene::sky::SkyInput;
+use crate::scene::sun::SunInput;
 use crate::scene::{Scene, SceneInput};
 use crate::settings;
 use crate::stages::{self, Beams, BlockMemory, BlockPlace, CouplingRows, Executor, Lighting, Sizes};
@@ -278,7 +278,7 @@ impl Host {
     /// The light of a scene, solved: no visibility is computed again.
     ///
     /// # Errors
-    /// What [`Sky::new`] and [`Sun::new`] refuse, radiances above 1e37 ([`limits::check_radiance`],
+    /// What [`Light::new`] refuses, radiances above 1e37 ([`limits::check_radiance`],
     /// [`limits::check_highlights`]), a system that diverges.
     pub fn light<'g>(
         &self,
@@ -300,10 +300,7 @@ impl Host {
         let bands = scene.bands();
         let mut report = geometry.report.clone();
         let mut clock = Clock::start();
-        let light = Light {
-            sky: sky.map(|s| Sky::new(s, bands)).transpose()?,
-            sun: sun.map(|s| Sun::new(s, bands)).transpose()?,
-        };
+        let light = Light::new(sky, sun, bands)?;
         let coupling = geometry.coupling()?;
         let lighting = Lighting { scene, bvh, elements, coupling: &coupling, light: &light, settings };
         let sizes = Sizes::new(scene, elements, &light, settings)?;
@@ -332,6 +329,11 @@ impl Host {
         report.sweeps = numbers.sweeps as u32;
         report.certified.solver = numbers.solver;
         report.reference_radiance = tables.reference.clone();
+        report.reference_from = match (&geometry.reference, &light.sky, &light.sun) {
+            (Some(_), ..) => "given",
+            (None, None, None) => "what emission lights",
+            _ => "sky and sun",
+        };
         report.seconds.radiosity = clock.lap();
         Ok(Lit { geometry, light, shape: sizes.shape(), tables, numbers, report })
     }
@@ -486,12 +488,14 @@ impl Lit<'_> {
         if let Some(sky) = &self.light.sky {
             sky.radiance(forward, &mut background);
         }
-        let of = |band: usize| Signature::new(sums, band, background[band]);
+        let of = |band: usize| Signature::new(sums, band, self.reference()[band], background[band]);
         let report = SignatureReport {
             radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
             projected_area: sums.area,
             mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
             contrast: (0..bands).map(|b| of(b).contrast).collect(),
+            error: (0..bands).map(|b| of(b).error).collect(),
+            unresolved_glints: (0..bands).map(|b| of(b).unresolved).collect(),
         };
         (report, sums.rays)
     }

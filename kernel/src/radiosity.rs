@@ -274,6 +274,30 @@ impl System<'_> {
         if hidden { self.elements.neighbours(unknown).find(exposed) } else { None }
     }
 
+    /// In those of the bands `dark`, as bits, in which anything that reflects diffusely is lit: sets `radiance` to the mean
+    /// over its area of the irradiance over pi, from the gathered table. Where a lamp alone gives light, an error is one of
+    /// what it lights. Where no row has met a lamp, it is what all of the lamps' light would give if it fell there.
+    pub fn lit_radiance(&self, dark: u64, irradiance: &[f64], radiance: &mut [f64]) {
+        for (band, radiance) in radiance.iter_mut().enumerate().filter(|(band, _)| dark >> band & 1 == 1) {
+            let (mut sum, mut all, mut sent) = (0.0, 0.0, 0.0);
+            for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
+                let facet = self.elements.facet_of(unknown).0;
+                let area = self.scene.areas().at(facet) * self.elements.share(unknown);
+                sent += area * self.scene.emission(self.scene.material(facet)).at(band);
+                if self.scene.diffuse(self.scene.material(facet)).at(band) > 0.0 {
+                    let area = area * f64::from(row.row.exposed);
+                    sum += area * irradiance.at(self.shape.at(unknown, self.shape.levels - 1).start + band);
+                    all += area;
+                }
+            }
+            if sum > 0.0 {
+                *radiance = sum / all * FRAC_1_PI;
+            } else if all > 0.0 {
+                *radiance = radiance.min(sent / all);
+            }
+        }
+    }
+
     /// Diffuse radiance that the irradiance on one level makes, for the rows of `range`.
     pub fn reflect(&self, range: Range<usize>, level: usize, irradiance: &[f64], out: &mut [f64]) {
         for (unknown, out) in range.zip(pieces(out, self.shape.bands)) {

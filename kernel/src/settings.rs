@@ -141,6 +141,7 @@ pub fn chains((tolerance, solution): (f64, f64), max_bounces: Option<u32>, rays:
         rays: (rays as f64 * 4.0 * growth) as u64,
         solution,
         pixel: (f64::INFINITY, 0.0),
+        apart: false,
     }
 }
 

@@ -20,10 +20,10 @@ use blik_kernel::scene::{Scene, SceneInput};
 use blik_kernel::settings;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
-use blik_kernel::sky::{Sky, SkyInput, SkyModel};
+use blik_kernel::sky::{SkyInput, SkyModel};
 use blik_kernel::stages::{self, Beams, BlockPlace, CouplingRows, Executor, Lighting, Merge, Sizes};
 use blik_kernel::subdivide::Cut;
-use blik_kernel::sun::{Sun, SunInput};
+use blik_kernel::sun::SunInput;
 use std::ops::Range;
 
 /// How a run is carried out; what it computes does not depend on it, but for the tolerance.
@@ -120,7 +120,8 @@ impl Workspace {
             },
             view: Outputs {
                 scratch: vec![0xa5; 1 << 20],
-                sums: vec![Sums::ZERO; CELLS],
+                // rows of cells, and of facets that may show glints
+                sums: vec![Sums::ZERO; CELLS + facets],
                 pixels: image.clone(),
                 terms: [image.clone(), image.clone(), image],
             },
@@ -240,10 +241,7 @@ pub fn run(
         counts.records += row.targets.len() + row.escapes.map(|b| b.packed.len()).sum::<usize>();
     }
 
-    let light = Light {
-        sky: sky.map(|s| Sky::new(s, scene.bands())).transpose()?,
-        sun: sun.map(|s| Sun::new(s, scene.bands())).transpose()?,
-    };
+    let light = Light::new(sky, sun, scene.bands())?;
     let lighting = Lighting {
         scene: &scene,
         bvh: &bvh,
@@ -296,13 +294,12 @@ fn view(
         let mut target = Target { image: image.1, components: [a.1, b.1, c.1] };
         counts.image.add(&image::rows(solved, &camera, range, &mut target, scratch)?);
     }
-    let view = View::new(solved, camera.forward(), out.sums.len())?;
+    let view = View::new(solved, camera.forward(), CELLS)?;
+    let rows = &mut out.sums[..view.rows()];
     let scratch = &mut out.scratch[..signature::scratch_bytes()?];
-    split(parts, view.rows(), 1, &mut out.sums, |range, out| {
-        signature::rows(solved, &view, range, scratch, out)
-    })?;
+    split(parts, view.rows(), 1, rows, |range, out| signature::rows(solved, &view, range, scratch, out))?;
     let mut sums = Sums::ZERO;
-    out.sums.iter().for_each(|row| sums.add(row));
+    rows.iter().for_each(|row| sums.add(row));
     (counts.projected_area, counts.signature_rays) = (sums.area, sums.rays);
     counts.intensity.copy_from_slice(&sums.intensity[..4]);
     Ok(())

@@ -15,6 +15,8 @@ pub struct Report {
     pub tolerance: f64,
     /// What errors are relative to, per band.
     pub reference_radiance: Vec<f64>,
+    /// Where it comes from.
+    pub reference_from: &'static str,
     /// Estimate of the true eps of the image.
     pub error_estimate: f64,
     /// Whether the estimate is within the tolerance.
@@ -113,6 +115,10 @@ pub struct Signature {
     pub mean_radiance: Vec<f64>,
     /// Against the background, per band; `None` where that is 0.
     pub contrast: Vec<Option<f64>>,
+    /// What the radiant intensity is expected to be wrong by, W/sr.
+    pub error: Vec<f64>,
+    /// What glints that may lie between cells bring on the mean, W/sr; not among the error.
+    pub unresolved_glints: Vec<f64>,
 }
 
 impl Report {
@@ -122,6 +128,7 @@ impl Report {
             version: env!("CARGO_PKG_VERSION"),
             tolerance: of.tolerance,
             reference_radiance: of.reference_radiance,
+            reference_from: of.reference_from,
             error_estimate: of.error_estimate,
             tolerance_met: of.tolerance_met,
             certified: Certified {
@@ -171,6 +178,8 @@ impl Report {
                 projected_area: of.signature.projected_area,
                 mean_radiance: of.signature.mean_radiance,
                 contrast: of.signature.contrast,
+                error: of.signature.error,
+                unresolved_glints: of.signature.unresolved_glints,
             },
         }
     }

@@ -146,7 +146,8 @@ fn cut_along_traces(receiver: &Convex, normal: Vec3, occluders: &[[Vec3; 3]]) ->
             continue;
         }
         let beside = |c: Vec3| (c - occluder[0]).dot(across);
-        for at in 0..count {
+        let before = count;
+        for at in 0..before {
             let Some(part) = parts.get(at).copied() else { continue };
             let [one, other] = [part.clip(beside, tolerance), part.clip(|c| -beside(c), tolerance)];
             if one.is_empty() || other.is_empty() || count == PARTS || part.corners().len() + 2 > CAPACITY {

@@ -16,6 +16,8 @@ pub struct Report {
     pub tolerance: f64,
     /// Reference radiance of each band.
     pub reference_radiance: Vec<f64>,
+    /// Where it comes from: "given", "sky and sun", or "what emission lights" where there is neither.
+    pub reference_from: &'static str,
     /// Expected eps of eq. 16 of this image, relative to the reference radiance.
     pub error_estimate: f64,
     /// True where the estimate is at most the tolerance.
@@ -129,6 +131,11 @@ pub struct SignatureReport {
     pub mean_radiance: Vec<f64>,
     /// (mean radiance - background)/background; none where the background is 0.
     pub contrast: Vec<Option<f64>>,
+    /// What the radiant intensity is expected to be wrong by, W/sr in each band.
+    pub error: Vec<f64>,
+    /// Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr in each
+    /// band; not among the error.
+    pub unresolved_glints: Vec<f64>,
 }
 
 impl Report {

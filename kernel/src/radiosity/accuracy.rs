@@ -28,7 +28,7 @@ const LINEAR: f64 = 11.0 / 3.0;
 const DEPARTURE: f64 = 2.0;
 
 /// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
-const UNSEEN: f64 = 0.5;
+pub const UNSEEN: f64 = 0.5;
 
 /// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
 const MOST_CARRIED: u32 = 12;

@@ -129,7 +129,7 @@ impl Tracer<'_, '_> {
             }
         }
         let share = 1.0 / f64::from(rays);
-        let finish = |record: Record| Some(Record { weight: share * record.weight, ..record });
+        let finish = |record: Record| Some(record.scaled_beam(share));
         self.sink.end_row(stats, finish, Record::join_beam);
         Some(())
     }
@@ -286,6 +286,9 @@ pub fn add(
             if exposed == 0.0 {
                 continue;
             }
+            images.spread(unknown, record, exposed, |band| {
+                sun.irradiance(band) * row.products(record.word()).at(band)
+            });
             for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.word()), l)) {
                 let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
                 for (band, (e, product)) in mean.iter_mut().zip(row.products(record.word())).enumerate() {

@@ -52,6 +52,11 @@ impl Lobe {
         Ok(Lobe { ratio, log_ratio, log_slope: log_slope(ratio - 1.0), peak: growth(2.0 * log_ratio) / PI })
     }
 
+    /// Long over short axis.
+    pub fn ratio(&self) -> f64 {
+        self.ratio
+    }
+
     /// Whether the lobe is so narrow that the caller treats it as an ideal mirror.
     pub fn is_mirror(&self) -> bool {
         self.ratio >= MIRROR_AXIS_RATIO

@@ -12,7 +12,12 @@ use crate::base::error::{Error, Field};
 use crate::base::math::{PI, Vec3, atan2, cos, fabs, sin, sqrt, unit};
 use crate::scene::MAX_BANDS;
 use cie::Cie;
+pub(in crate::scene) use table::SpotSun;
 use table::Table;
+
+/// A spot that gives this share of the irradiance of a plane that faces it is a sun: its shadows have edges, and rays that
+/// look for the sky would meet it or not.
+const SUN_SHARE: f64 = 0.05;
 
 /// Radiance and irradiance above this are refused, so that f32 images stay finite.
 pub(crate) const LARGEST: f64 = 1e37;
@@ -142,6 +147,26 @@ impl<'a> Sky<'a> {
         };
         let ground = if whole_sphere { &[] } else { input.ground };
         Ok(Sky { model, radiance: input.radiance, ground, up })
+    }
+
+    /// Takes a table's bright spot out, if it carries a large share of what the brightest plane receives.
+    pub(in crate::scene) fn take_sun(&mut self) -> Option<(SpotSun<'a>, &'a [f64])> {
+        let Model::Table(table) = &mut self.model else { return None };
+        let whole = *table;
+        let spot = table.take_sun(self.radiance)?;
+        let mut facing = [0.0; MAX_BANDS];
+        let facing = facing.get_mut(..self.radiance.len())?;
+        whole.irradiance(spot.direction, 1e-3, facing);
+        let share = |(band, all): (usize, &f64)| {
+            let sample = spot.samples.get(band).or(spot.samples.first()).map_or(0.0, |x| f64::from(*x));
+            if *all > 0.0 { spot.scale * sample / all } else { 0.0 }
+        };
+        let most = facing.iter().enumerate().map(share).fold(0.0, f64::max);
+        if most < SUN_SHARE {
+            *table = whole;
+            return None;
+        }
+        Some((spot, self.radiance))
     }
 
     /// Number of spectral bands.

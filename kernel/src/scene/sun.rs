@@ -3,7 +3,7 @@
 use crate::base::error::{Error, Field};
 use crate::base::math::{PI, TAU, Vec3, acos, asin, clamp, cos, frame, sin, sqrt, unit};
 use crate::scene::MAX_BANDS;
-use crate::scene::sky::{LARGEST, check_bands};
+use crate::scene::sky::{LARGEST, SpotSun, check_bands};
 
 /// What a sun is made from.
 #[derive(Clone, Copy, Debug)]
@@ -20,10 +20,19 @@ pub struct SunInput<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct Sun<'a> {
     direction: Vec3,
-    irradiance: &'a [f64],
+    irradiance: Irradiance<'a>,
     half_angle: f64,
     sine: f64,
     cosine: f64,
+}
+
+/// Irradiance of a plane that faces a sun.
+#[derive(Clone, Copy, Debug)]
+enum Irradiance<'a> {
+    /// One value a band.
+    Told(&'a [f64]),
+    /// Of a bright spot of a sky table: a sample, one value or one of each band, the bands' factors and the spot's size.
+    Spot(&'a [f32], &'a [f64], f64),
 }
 
 impl<'a> Sun<'a> {
@@ -46,7 +55,8 @@ impl<'a> Sun<'a> {
         check_bands(input.irradiance, bands, Field::SunIrradiance)?;
         let half_angle = degrees * (PI / 180.0);
         let (sine, cosine) = (sin(half_angle), cos(half_angle));
-        let sun = Sun { direction, irradiance: input.irradiance, half_angle, sine, cosine };
+        let irradiance = Irradiance::Told(input.irradiance);
+        let sun = Sun { direction, irradiance, half_angle, sine, cosine };
         for (band, &value) in input.irradiance.iter().enumerate() {
             if sun.disc_radiance(band) > LARGEST {
                 return Err(Error::Range { field: Field::SunIrradiance, band, value });
@@ -55,9 +65,25 @@ impl<'a> Sun<'a> {
         Ok(sun)
     }
 
+    /// The sun that was taken out of a sky table of these factors.
+    pub(in crate::scene) fn of_spot(spot: &SpotSun<'a>, factors: &'a [f64]) -> Sun<'a> {
+        let half_angle = clamp(spot.half_angle, 1e-4 * (PI / 180.0), 10.0 * (PI / 180.0));
+        let irradiance = Irradiance::Spot(spot.samples, factors, spot.scale);
+        let (sine, cosine) = (sin(half_angle), cos(half_angle));
+        Sun { direction: spot.direction, irradiance, half_angle, sine, cosine }
+    }
+
+    /// Whether it was taken out of a sky table.
+    pub fn is_of_sky(&self) -> bool {
+        matches!(self.irradiance, Irradiance::Spot(..))
+    }
+
     /// Number of spectral bands.
     pub fn bands(&self) -> usize {
-        self.irradiance.len()
+        match self.irradiance {
+            Irradiance::Told(values) => values.len(),
+            Irradiance::Spot(_, factors, _) => factors.len(),
+        }
     }
 
     /// The same sun seen in another direction, a unit vector: its image in mirrors.
@@ -72,7 +98,14 @@ impl<'a> Sun<'a> {
 
     /// Irradiance of a plane that faces the sun, W m-2; 0 for a band that is not there.
     pub fn irradiance(&self, band: usize) -> f64 {
-        self.irradiance.get(band).copied().unwrap_or(0.0)
+        match self.irradiance {
+            Irradiance::Told(values) => values.get(band).copied().unwrap_or(0.0),
+            Irradiance::Spot(samples, factors, scale) => {
+                let sample = samples.get(band).or(samples.first().filter(|_| samples.len() == 1));
+                let sample = sample.map_or(0.0, |x| f64::from(*x));
+                scale * sample * factors.get(band).copied().unwrap_or(0.0)
+            }
+        }
     }
 
     /// Angular radius in radians; 0 for a point.

@@ -35,8 +35,14 @@ impl Beams {
     ) -> Result<(), X::Error> {
         let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
         let shape = settings::shape(settings.max_bounces, scene.bands());
-        let mut images = Noting { slots: &mut *solution.slots, thrown: &mut *solution.thrown };
+        let mut images = Noting {
+            slots: &mut *solution.slots,
+            thrown: &mut *solution.thrown,
+            spread: &mut *scratch.spread,
+            reference: &*solution.reference,
+        };
         if self.rows == 0 {
+            images.spread.fill(0.0);
             images.slots.fill(0);
             images.thrown.fill(0.0);
         }

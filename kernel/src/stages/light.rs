@@ -11,7 +11,7 @@ use crate::radiosity::direct::{self, Shape};
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Solution, SolutionMemory, SolutionSize};
 use crate::radiosity::solver;
-use crate::radiosity::sun_image;
+use crate::radiosity::sun_image::{self, SPREAD};
 use crate::rays::bvh::Bvh;
 use crate::scene::Scene;
 use crate::scene::light::Light;
@@ -56,6 +56,11 @@ pub struct Scratch<'m> {
     pub(super) orders: &'m mut [f64],
     pub(super) own: &'m mut [Own],
     pub(super) carried: &'m mut [f32],
+    /// Where on elements light falls that may stay a mean; of no length where no mirror throws sunlight.
+    pub(super) spread: &'m mut [f32],
+    /// Bands, as bits, that emission alone lights and for which the caller gave no reference radiance: it follows from the
+    /// solution.
+    pub(super) dark: u64,
 }
 
 /// How a scene's mirrors throw a light's sun; `None` where there are no such beams.
@@ -99,6 +104,12 @@ impl Sizes {
             .and::<f64>(values * self.orders)
             .and::<Own>(values)
             .and::<f32>(2 * values)
+            .and::<f32>(self.spread())
+    }
+
+    /// Values of [`Scratch::spread`].
+    fn spread(&self) -> usize {
+        if self.beams > 0 { self.solution.unknowns * SPREAD } else { 0 }
     }
 
     /// Carves the scratch memory out of an arena.
@@ -109,6 +120,8 @@ impl Sizes {
             orders: arena.take(values * self.orders)?,
             own: arena.take(values)?,
             carried: arena.take(2 * values)?,
+            spread: arena.take(self.spread())?,
+            dark: 0,
         })
     }
 
@@ -138,10 +151,13 @@ impl Lighting<'_> {
     ) -> Result<u64, X::Error> {
         let Lighting { scene, bvh, elements, coupling, light, settings } = *self;
         limits::check_highlights(scene, light)?;
-        match given {
-            Some(given) => memory.reference.iter_mut().zip(given).for_each(|(to, from)| *to = *from),
+        scratch.dark = match given {
+            Some(given) => {
+                memory.reference.iter_mut().zip(given).for_each(|(to, from)| *to = *from);
+                0
+            }
             None => light.reference_radiance(scene, memory.reference),
-        }
+        };
         let shape = settings::shape(settings.max_bounces, scene.bands());
         match &light.sky {
             None => scratch.direct.fill(0.0),

@@ -2,14 +2,15 @@
 
 use super::light::{Lighting, SHARES, Scratch};
 use super::{Executor, Largest};
-use crate::base::index::{Index, IndexMut};
+use crate::base::index::{Index, IndexMut, pieces};
+use crate::base::math::narrow;
 use crate::radiosity::System;
 use crate::radiosity::accuracy::{self, Own};
 use crate::radiosity::direct;
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory};
 use crate::radiosity::solver::{History, Solver};
-use crate::radiosity::sun_image::SunImages;
+use crate::radiosity::sun_image::{self, SPREAD, SunImages};
 use crate::settings::Settings;
 use core::ops::Range;
 
@@ -23,15 +24,16 @@ pub(super) fn solve<'m, X: Executor>(
 ) -> Result<Solution<'m>, X::Error> {
     let Lighting { scene, elements, coupling, light, settings, .. } = *of;
     let SolutionMemory { reference, irradiance, sun, slots, thrown, variance } = memory;
-    let (reference, sun, images) = (&*reference, &*sun, SunImages { slots, thrown });
+    let (sun, images) = (&*sun, SunImages { slots, thrown });
     let shape = crate::settings::shape(settings.max_bounces, scene.bands());
-    let Scratch { direct, orders, own, carried } = scratch;
+    let Scratch { direct, orders, own, carried, spread, dark } = scratch;
     let size = elements.unknowns() * shape.bands;
     let system = System { scene, elements, coupling, light, direct: &[], sun, shape };
     let (mut before, mut bounds) = (0, None);
     if shape.levels == 1 {
-        let first = Solve { system: System { direct, ..system }, settings, reference };
+        let first = Solve { system: System { direct, ..system }, settings, reference: &*reference };
         before = first.run(orders, irradiance, &mut bounds, run)?.map_or(0, |s| s.done);
+        system.lit_radiance(*dark, irradiance, reference);
         let missed = orders.part_mut(size..2 * size);
         run.rows(missed, shape.bands, 0.0, |range, out| {
             system.slopes(range, irradiance, out);
@@ -39,14 +41,31 @@ pub(super) fn solve<'m, X: Executor>(
         })?;
         direct::add(missed, shape, direct);
     }
-    let last = Solve { system: System { direct, ..system }, settings, reference };
+    let last = Solve { system: System { direct, ..system }, settings, reference: &*reference };
     let sweeps = last.run(orders, irradiance, &mut bounds, run)?;
+    if shape.levels > 1 {
+        system.lit_radiance(*dark, irradiance, reference);
+    }
+    let reference = &*reference;
     let at = if shape.levels == 1 { 0 } else { shape.levels };
     let radiance = orders.part(at * size..(at + 1) * size);
     limits::check_radiance(radiance, shape.bands)?;
-    images.take_off(shape, elements.facet_sides(), |unknown| elements.facet_side(unknown), irradiance);
+    images.take_off(shape, |unknown| elements.facet_side(unknown), irradiance);
     system.extend(irradiance);
     errors(&system, radiance, reference, (own, carried), variance, run)?;
+    // what no ray of a row has met may be a lamp
+    let glare = (0..shape.bands).filter(|band| *dark >> band & 1 == 1 && reference.at(*band) > 0.0);
+    let glare = glare.map(|band| scene.largest_emission(band) / reference.at(band)).fold(0.0, f64::max);
+    if glare > 1.0 {
+        for ((_, row), variance) in coupling.rows(0..variance.len()).zip(variance.iter_mut()) {
+            let unseen = accuracy::UNSEEN * glare / f64::from(row.row.rays.max(1));
+            *variance += if row.row.rays > 0 { narrow(unseen * unseen) } else { 0.0 };
+        }
+    }
+    for (unknown, (variance, spread)) in variance.iter_mut().zip(pieces(spread, SPREAD)).enumerate() {
+        let known = images.are_known(elements.facet_side(unknown));
+        *variance += narrow(sun_image::variance(spread, known));
+    }
     Ok(Solution {
         shape,
         reference,

@@ -46,7 +46,12 @@ pub struct ChainSettings {
     pub solution: f64,
     /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
     pub pixel: (f64, f64),
+    /// Whether what the first mirror or narrow lobe shows of the sun and its images is left out: it is found apart.
+    pub apart: bool,
 }
+
+/// Lobes of this axis ratio and above are narrow: cells of a signature may miss their highlights.
+pub const APART: f64 = 10.0;
 
 /// [`ChainSettings::gather`] where all pixels of an image may take rays.
 const GATHER_ALL: f64 = 0.6;
@@ -72,7 +77,7 @@ impl ChainSettings {
 
     /// The same for sums over so many rays that errors of single elements count little.
     pub(crate) fn of_sums(self) -> ChainSettings {
-        ChainSettings { gather: f64::INFINITY, ..self }
+        ChainSettings { gather: f64::INFINITY, apart: true, ..self }
     }
 }
 
@@ -197,6 +202,9 @@ pub struct Path {
     /// What n rays like this one miss of highlights that are seen in lobes, times n: the geometric mean of the brightest
     /// that the ray has met and of how bright it is at its middle, relative to the reference radiance.
     pub glare: f64,
+    /// What the sun's disc brings on the mean to who meets it by chance alone, where mirrors show it that were not asked
+    /// where: its irradiance over all directions, relative to the reference radiance.
+    pub chance: f64,
     /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
     pub sampled: bool,
 }
@@ -442,6 +450,7 @@ impl Solved<'_> {
         loop {
             let Some(met) = hit else {
                 self.escape(leg, terms);
+                path.chance = path.chance.max(self.chance(leg));
                 return None;
             };
             path.object |= leg.mirrors == 0;
@@ -470,6 +479,10 @@ impl Solved<'_> {
             leg.mirrors += 1;
             leg.lobe =
                 mirror.lobe.is_some() || leg.lobe && leg.imaged && surface.flat_mirror(self.scene).is_some();
+            let apart = self.settings.apart && leg.mirrors == 1;
+            if apart && mirror.lobe.is_none() {
+                (leg.lobe, leg.imaged) = (true, !self.images.slots.is_empty() && self.knows_images(&surface));
+            }
             match &mirror.lobe {
                 None => {
                     let direction = surface.mirrored(self.scene, leg.ray.direction);
@@ -486,8 +499,10 @@ impl Solved<'_> {
                         continue;
                     }
                 }
-                Some(_) => {
-                    self.add_sun_gloss(leg, &surface, &mirror, how, terms, path);
+                Some(lobe) => {
+                    if !(apart && lobe.ratio() >= APART) {
+                        self.add_sun_gloss(leg, &surface, &mirror, how, terms, path);
+                    }
                     leg.imaged = self.knows_images(&surface);
                     leg.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
@@ -603,6 +618,17 @@ impl Solved<'_> {
             *square += value * value;
         }
         fan.count += 1;
+    }
+
+    /// See [`Path::chance`].
+    #[inline]
+    fn chance(&self, leg: &Leg<'_>) -> f64 {
+        match &self.light.sun {
+            Some(sun) if !sun.is_point() && leg.mirrors > 0 && !leg.lobe && !leg.sunless => {
+                0.25 * FRAC_1_PI * self.gloss_at_stake(leg.through, sun)
+            }
+            _ => 0.0,
+        }
     }
 
     /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.

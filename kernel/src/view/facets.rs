@@ -28,8 +28,7 @@ pub fn side(
         // what lies inside a body receives nothing
         let share = solved.elements.share(unknown) * f64::from(coupling.row(unknown).exposed);
         let lit = sun.get(unknown).copied().unwrap_or(0.0);
-        let place = (solved.elements.facet_sides(), solved.elements.facet_side(unknown));
-        let thrown = solved.images.mean(shape, place, (unknown, level));
+        let thrown = solved.images.mean(shape, solved.elements.facet_side(unknown), (unknown, level));
         for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
             let sun = solved.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
             *e += (m + thrown.get(band).copied().unwrap_or(0.0) + lit * sun) * share;

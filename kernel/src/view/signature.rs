@@ -1,17 +1,23 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
+//!
+//! Rays through cells tell all but what the first mirror or narrow lobe shows of the sun, which is found facet by facet
+//! ([`glints`]) and may be far smaller than a cell.
+
+mod glints;
 
 use crate::base::arena::{Arena, Need, plain_table};
 use crate::base::error::Error;
 use crate::base::index::Index;
-use crate::base::math::{Vec3, frame, unit};
+use crate::base::math::{Vec3, frame, sqrt, unit};
 use crate::base::qmc::Sequence;
 use crate::rays::bvh::AnswerBuffer;
 use crate::rays::ray::{Hit, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::Camera;
-use crate::view::chain::{Outlook, Sample, Solved, Terms, Way, Work};
+use crate::view::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
 use crate::view::raster::{Lines, Samples, Span};
 use core::ops::Range;
+use glints::Glints;
 
 /// Rays that look at the object's whole projection along one direction, on a square grid of cells.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +25,8 @@ pub struct View {
     samples: Samples,
     cells: usize,
     cell_area: f64,
+    /// Rows that look for glints.
+    glints: usize,
 }
 
 /// The golden ratio less 1: rows of cells are shifted by its multiples, which fill a cell evenly.
@@ -52,7 +60,9 @@ impl View {
             shear: if size.x > 0.0 { size.y * step / size.x } else { 0.0 },
             turn: GOLDEN,
         };
-        Ok(View { samples, cells, cell_area: size.x * size.y * step * step })
+        let wanted = glints::are_wanted(solved);
+        let glints = if wanted { solved.scene.facets().div_ceil(glints::FACETS) } else { 0 };
+        Ok(View { samples, cells, cell_area: size.x * size.y * step * step, glints })
     }
 
     /// The view of a camera's middle: along its viewing direction.
@@ -60,9 +70,9 @@ impl View {
         View::new(solved, camera.forward(), cells)
     }
 
-    /// Cells along each side: rows to be computed.
+    /// Rows to be computed: those of cells, and those of facets that may show glints.
     pub fn rows(&self) -> usize {
-        self.cells
+        self.cells + self.glints
     }
 }
 
@@ -73,27 +83,83 @@ plain_table! {
         pub area: f64,
         /// Radiant intensity in W/sr, one value per band.
         pub intensity: [f64; MAX_BANDS],
+        /// The same by every fourth row of cells, and how many rows these are.
+        pub parts: [[f64; MAX_BANDS]; PARTS],
+        /// Rows of each part.
+        pub counts: [f64; PARTS],
+        /// Sum of the squares of errors of glints that are in part hidden or in shadow, (W/sr)^2.
+        pub doubt2: [f64; MAX_BANDS],
+        /// Sum over the projected area of the errors expected of the diffuse solution, of lobes and of chains that were cut,
+        /// relative to the reference radiance.
+        pub alike: f64,
+        /// The same of [`Path::chance`].
+        pub chance: f64,
         /// Rays traced.
         pub rays: u64,
     }
 }
 
+/// Parts of a signature whose differences tell its error: every fourth row.
+const PARTS: usize = 4;
+
 impl Sums {
     /// Nothing yet.
-    pub const ZERO: Sums = Sums { area: 0.0, intensity: [0.0; MAX_BANDS], rays: 0 };
+    pub const ZERO: Sums = Sums {
+        area: 0.0,
+        intensity: [0.0; MAX_BANDS],
+        parts: [[0.0; MAX_BANDS]; PARTS],
+        counts: [0.0; PARTS],
+        doubt2: [0.0; MAX_BANDS],
+        alike: 0.0,
+        chance: 0.0,
+        rays: 0,
+    };
 
     /// Back to nothing.
     fn clear(&mut self) {
-        self.area = 0.0;
+        (self.area, self.alike, self.chance) = (0.0, 0.0, 0.0);
         self.intensity.fill(0.0);
+        self.parts.iter_mut().for_each(|part| part.fill(0.0));
+        self.counts.fill(0.0);
+        self.doubt2.fill(0.0);
         self.rays = 0;
+    }
+
+    /// Notes that what there is so far is a row of cells.
+    fn end_row(&mut self, row: usize) {
+        if let (Some(part), Some(count)) = (self.parts.get_mut(row % PARTS), self.counts.get_mut(row % PARTS))
+        {
+            part.iter_mut().zip(&self.intensity).for_each(|(part, value)| *part = *value);
+            *count = 1.0;
+        }
     }
 
     /// Adds the next row.
     pub fn add(&mut self, next: &Sums) {
         self.area += next.area;
-        self.intensity.iter_mut().zip(&next.intensity).for_each(|(a, b)| *a += b);
+        let add = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
+        add(&mut self.intensity, &next.intensity);
+        self.parts.iter_mut().zip(&next.parts).for_each(|(to, from)| add(to, from));
+        add(&mut self.counts, &next.counts);
+        add(&mut self.doubt2, &next.doubt2);
+        self.alike += next.alike;
+        self.chance += next.chance;
         self.rays += next.rays;
+    }
+
+    /// What a band's intensity by rows of cells is expected to be wrong by: parts of it, each as if it were all, differ the
+    /// less the more even the object is.
+    fn unevenness(&self, band: usize) -> f64 {
+        let rows = self.counts.iter().sum::<f64>();
+        let whole = |part: usize| match self.counts.at(part) {
+            0.0 => None,
+            count => Some(self.parts.get(part).map_or(0.0, |values| values.at(band)) * rows / count),
+        };
+        let parts = || (0..PARTS).filter_map(whole);
+        let n = parts().count().max(2) as f64;
+        let mean = parts().sum::<f64>() / n;
+        let squares = parts().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+        sqrt(squares / (n * (n - 1.0)))
     }
 }
 
@@ -170,14 +236,20 @@ fn each_row<'s>(
     let (mut next, end) = (range.start, range.end);
     for row in range {
         sums.clear();
+        if row >= view.cells {
+            tracer.glints(row - view.cells, sums);
+            each(all, sums);
+            continue;
+        }
         if row == next && !samples {
-            next = end.min(row + TOGETHER);
+            next = end.min(view.cells).min(row + TOGETHER);
             lines.find(solved.bvh, &view.samples, view.cells, row as isize..next as isize);
         }
         match lines.of(row as isize) {
             Some(spans) if !samples => tracer.spans(row, spans, sums),
             _ => tracer.sample(row, sums),
         }
+        sums.end_row(row);
         each(all, sums);
     }
     Ok(all)
@@ -194,6 +266,15 @@ struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
+    /// Adds the glints of a row of facets.
+    #[inline(never)]
+    fn glints(&mut self, row: usize, sums: &mut Sums) {
+        let Tracer { solved, view, work, .. } = self;
+        let whole = self.area * (view.cells * view.cells) as f64;
+        let products = &mut work.images;
+        Glints { solved, forward: view.samples.forward, whole, products }.row(row, sums);
+    }
+
     /// Adds one ray in each cell of a row.
     #[cold]
     fn sample(&mut self, row: usize, sums: &mut Sums) {
@@ -205,8 +286,8 @@ impl Tracer<'_> {
             let ray = ray_of(column);
             let any = |n| if n == column { ray } else { ray_of(n) };
             let hit = solved.bvh.closest_of(&mut ahead, column, end, any);
-            self.follow(&ray, hit, (row, column), sums);
-            self.add(if hit.is_some() { 1.0 } else { 0.0 }, sums);
+            let path = self.follow(&ray, hit, (row, column), sums);
+            self.add(if hit.is_some() { 1.0 } else { 0.0 }, &path, sums);
         }
     }
 
@@ -254,29 +335,32 @@ impl Tracer<'_> {
             let ray = self.view.samples.ray(row as isize, at);
             let solved = self.solved;
             let hit = solved.bvh.closest_among(&ray, &[span.facet()]).or_else(|| solved.bvh.closest(&ray));
-            self.follow(&ray, hit, (row, at as u32), sums);
-            self.add(share, sums);
+            let path = self.follow(&ray, hit, (row, at as u32), sums);
+            self.add(share, &path, sums);
         }
     }
 
     /// Finds the terms of a ray.
     #[inline]
-    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, (row, index): (usize, u32), sums: &mut Sums) {
+    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, (row, index): (usize, u32), sums: &mut Sums) -> Path {
         self.terms.clear(self.solved.shape.bands);
         sums.rays += 1;
         if hit.is_none() {
-            return;
+            return Path::default();
         }
         let sample = Sample::OneOf { seed: row as u32, index };
         let (seen, outlook) = ((ray, hit), &mut self.outlook);
         let path = self.solved.radiance_with(seen, sample, self.terms, self.work, outlook);
         sums.rays += u64::from(path.rays);
+        path
     }
 
     /// Adds what was found last for so many cells.
     #[inline]
-    fn add(&self, cells: f64, sums: &mut Sums) {
+    fn add(&self, cells: f64, path: &Path, sums: &mut Sums) {
         let area = cells * self.area;
+        sums.alike += area * (sqrt(path.variance) + path.tail);
+        sums.chance += area * path.chance;
         sums.area += area;
         for (band, i) in sums.intensity.iter_mut().take(self.solved.shape.bands).enumerate() {
             *i += self.terms.sum(band) * area;
@@ -299,14 +383,27 @@ pub struct Signature {
     pub mean_radiance: f64,
     /// (mean radiance - background) / background; `None` where the background is 0.
     pub contrast: Option<f64>,
+    /// What the intensity is expected to be wrong by, W/sr; glints that may lie between cells are not among it.
+    pub error: f64,
+    /// Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr. Those
+    /// that more than one curved mirror shows are not looked for.
+    pub unresolved: f64,
 }
 
+/// Error of a signature's rows over what its parts differ by: four times as many rows are more than twice as even.
+const UNEVEN: f64 = 1.05;
+
+/// The same of errors of elements, lobes and chains, of which those of different places do not all add up.
+const ALIKE: f64 = 0.5;
+
 impl Signature {
-    /// The signature in `band` against a background radiance.
-    pub fn new(sums: &Sums, band: usize, background: f64) -> Signature {
+    /// The signature in `band`, of which `reference` is the reference radiance, against a background radiance.
+    pub fn new(sums: &Sums, band: usize, reference: f64, background: f64) -> Signature {
         let intensity = sums.intensity.at(band);
         let mean_radiance = if sums.area > 0.0 { intensity / sums.area } else { 0.0 };
         let contrast = (background > 0.0).then(|| (mean_radiance - background) / background);
-        Signature { intensity, mean_radiance, contrast }
+        let (rows, alike) = (UNEVEN * sums.unevenness(band), ALIKE * reference * sums.alike);
+        let error = sqrt(rows * rows + sums.doubt2.at(band) + alike * alike);
+        Signature { intensity, mean_radiance, contrast, error, unresolved: reference * sums.chance }
     }
 }

@@ -16,7 +16,42 @@ pub(super) struct Table<'a> {
     x: Vec3,
     y: Vec3,
     up: Vec3,
+    /// What was taken out as a sun.
+    spot: Option<Spot>,
 }
+
+/// A bright spot of a table: of each sample of a window the part of the brightest one's spectrum that exceeds what stands
+/// about it.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    /// First row, and rows.
+    rows: (usize, usize),
+    /// First column, wrapped, and columns.
+    columns: (usize, usize),
+    /// Where the brightest sample begins.
+    peak: usize,
+    /// Share of its spectrum that is left.
+    base: f64,
+}
+
+/// A sun that a table holds.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct SpotSun<'a> {
+    /// Toward its middle.
+    pub direction: Vec3,
+    /// Of the disc, in radians.
+    pub half_angle: f64,
+    /// The brightest sample, one value or one of each band.
+    pub samples: &'a [f32],
+    /// Irradiance of a plane that faces it, over that sample's radiance.
+    pub scale: f64,
+}
+
+/// Half the width of the window about a bright sample, in radians: a blurred sun and its glow.
+const WINDOW: f64 = 0.05;
+
+/// The brightest sample of a sun is so many times what stands about its window.
+const BRIGHT: f64 = 20.0;
 
 /// One elevation of the quadrature: the plane's cosine there is `constant + swing cos(azimuth - normal's)`,
 /// positive within `arc` (cosine `cos_arc`) of the normal's azimuth.
@@ -85,12 +120,118 @@ impl<'a> Table<'a> {
             x,
             y: up.cross(x),
             up,
+            spot: None,
         })
     }
 
-    fn row(&self, row: usize) -> &'a [f32] {
-        let length = self.columns * self.bands;
-        self.samples.get(row * length..(row + 1) * length).unwrap_or(&[])
+    /// The sample of a row and a column.
+    fn sample(&self, row: usize, column: usize) -> &'a [f32] {
+        let start = (row * self.columns + column) * self.bands;
+        self.samples.get(start..start + self.bands).unwrap_or(&[])
+    }
+
+    /// By how much of the brightest sample a sample counts: the least over the bands, so that nothing is left below 0.
+    fn ratio(&self, sample: &[f32], peak: &[f32]) -> f64 {
+        let of = |(value, peak): (&f32, &f32)| match *peak > 0.0 {
+            true => f64::from(*value) / f64::from(*peak),
+            false => f64::INFINITY,
+        };
+        sample.iter().zip(peak).map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The part of the brightest sample's spectrum that was taken out at a row and a column.
+    fn taken(&self, spot: &Spot, row: usize, column: usize) -> f64 {
+        let across = (column + self.columns - spot.columns.0) % self.columns.max(1);
+        if !(spot.rows.0..spot.rows.0 + spot.rows.1).contains(&row) || across >= spot.columns.1 {
+            return 0.0;
+        }
+        let peak = self.samples.get(spot.peak..spot.peak + self.bands).unwrap_or(&[]);
+        let ratio = self.ratio(self.sample(row, column), peak);
+        if ratio > spot.base && ratio.is_finite() { ratio - spot.base } else { 0.0 }
+    }
+
+    /// The direction of a row's and a column's middle.
+    fn toward(&self, row: f64, column: f64) -> Vec3 {
+        let (elevation, azimuth) =
+            (FRAC_PI_2 - (row + 0.5) * PI / self.rows as f64, (column + 0.5) * TAU / self.columns as f64);
+        let level = self.x * cos(azimuth) + self.y * sin(azimuth);
+        level * cos(elevation) + self.up * sin(elevation)
+    }
+
+    /// Takes the brightest spot out, where it is small and far brighter than what stands about it. `factors` are the bands'.
+    pub(super) fn take_sun(&mut self, factors: &[f64]) -> Option<SpotSun<'a>> {
+        let weight = |sample: &[f32]| {
+            let factor = |band: usize| factors.get(band).copied().unwrap_or(1.0);
+            sample.iter().enumerate().map(|(band, value)| f64::from(*value) * factor(band)).sum::<f64>()
+        };
+        let brightest = |(best, most): (usize, f64), (place, sample): (usize, &[f32])| {
+            let own = weight(sample);
+            if own > most { (place, own) } else { (best, most) }
+        };
+        let (place, most) = parts(self.samples, self.bands).enumerate().fold((0, 0.0), brightest);
+        let (row, column) = (place / self.columns.max(1), place % self.columns.max(1));
+        let step = (PI / self.rows as f64, TAU / self.columns as f64);
+        let down = 1 + (WINDOW / step.0) as usize;
+        // columns draw together toward the poles
+        let level = cos(FRAC_PI_2 - (row as f64 + 0.5) * step.0);
+        let aside = 1 + (WINDOW / (step.1 * level.max(step.0))) as usize;
+        let (top, bottom) = (row.saturating_sub(down), (row + down).min(self.rows - 1));
+        if most <= 0.0 || 2 * aside + 3 >= self.columns {
+            return None;
+        }
+        let wrapped = |column: isize| column.rem_euclid(self.columns as isize) as usize;
+        let left = wrapped(column as isize - aside as isize);
+        let peak = place * self.bands;
+        let spectrum = self.samples.get(peak..peak + self.bands)?;
+        let mut base: f64 = 0.0;
+        for row in top.saturating_sub(1)..=(bottom + 1).min(self.rows - 1) {
+            for across in 0..2 * aside + 3 {
+                let edge = row < top || row > bottom || across == 0 || across == 2 * aside + 2;
+                let column = wrapped(left as isize + across as isize - 1);
+                let ratio = self.ratio(self.sample(row, column), spectrum);
+                base = base.max(if edge && ratio.is_finite() { ratio } else { 0.0 });
+            }
+        }
+        if base * BRIGHT > 1.0 {
+            return None;
+        }
+        let spot = Spot { rows: (top, bottom + 1 - top), columns: (left, 2 * aside + 1), peak, base };
+        let (mut energy, mut middle, mut square) = (0.0, Vec3::ZERO, 0.0);
+        for pass in 0..2 {
+            let axis = unit(middle).unwrap_or(Vec3::Z);
+            (energy, square) = (0.0, 0.0);
+            for (row, across) in (top..=bottom).flat_map(|row| (0..=2 * aside).map(move |a| (row, a))) {
+                let column = wrapped(left as isize + across as isize);
+                let height = FRAC_PI_2 - (row as f64 + 0.5) * step.0;
+                let share = self.taken(&spot, row, column) * step.0 * step.1 * cos(height);
+                let toward = self.toward(row as f64, column as f64);
+                energy += share;
+                if pass == 0 {
+                    middle += toward * share;
+                } else {
+                    square += share * (toward - axis).length_squared();
+                }
+            }
+        }
+        // a bilinear hat of two steps spreads what a sample holds by a sixth of a step squared, each way
+        let width = level * step.1;
+        let spread = square / energy + (step.0 * step.0 + width * width) / 6.0;
+        self.spot = Some(spot);
+        Some(SpotSun {
+            direction: unit(middle)?,
+            half_angle: sqrt(2.0 * spread),
+            samples: spectrum,
+            scale: energy,
+        })
+    }
+
+    /// A sample's value of one band less what was taken out there.
+    #[inline]
+    fn left(&self, row: usize, column: usize, band: usize) -> f64 {
+        let value = self.sample(row, column).get(band).map_or(0.0, |value| f64::from(*value));
+        let Some(spot) = &self.spot else { return value };
+        let peak = self.samples.get(spot.peak + band).map_or(0.0, |value| f64::from(*value));
+        (value - self.taken(spot, row, column) * peak).max(0.0)
     }
 
     /// Interpolated samples toward the unit vector `direction`, per band.
@@ -104,16 +245,21 @@ impl<'a> Table<'a> {
         let top = top as usize;
         let left = (left as isize).rem_euclid((self.columns as isize).max(1)) as usize;
         let right = (left + 1) % self.columns.max(1);
-        let (upper, lower) = (self.row(top), self.row((top + 1).min(self.rows - 1)));
+        let below = (top + 1).min(self.rows - 1);
         let corners = [
-            (upper, left, (1.0 - t) * (1.0 - s)),
-            (upper, right, (1.0 - t) * s),
-            (lower, left, t * (1.0 - s)),
-            (lower, right, t * s),
+            (top, left, (1.0 - t) * (1.0 - s)),
+            (top, right, (1.0 - t) * s),
+            (below, left, t * (1.0 - s)),
+            (below, right, t * s),
         ];
         self.each_band(out, |sums| {
             for (row, column, weight) in corners {
-                for (sum, &sample) in sums.iter_mut().zip(row.iter().skip(column * self.bands)) {
+                if self.spot.is_some() {
+                    let values = sums.iter_mut().enumerate();
+                    values.for_each(|(band, sum)| *sum += weight * self.left(row, column, band));
+                    continue;
+                }
+                for (sum, &sample) in sums.iter_mut().zip(self.sample(row, column)) {
                     *sum += weight * f64::from(sample);
                 }
             }
@@ -123,9 +269,10 @@ impl<'a> Table<'a> {
     /// Largest sample per band.
     pub(super) fn largest(&self, out: &mut [f64]) {
         self.each_band(out, |sums| {
-            for sample in parts(self.samples, self.bands) {
-                for (largest, &value) in sums.iter_mut().zip(sample) {
-                    *largest = largest.max(f64::from(value));
+            for place in 0..self.rows * self.columns {
+                let (row, column) = (place / self.columns.max(1), place % self.columns.max(1));
+                for (band, largest) in sums.iter_mut().enumerate() {
+                    *largest = largest.max(self.left(row, column, band));
                 }
             }
         });
@@ -175,7 +322,7 @@ impl<'a> Table<'a> {
         let turn = atan2(across, fabs(height));
         self.each_band(out, |sums| {
             for gap in 0..=self.rows {
-                let rows = [self.row(gap.saturating_sub(1)), self.row(gap.min(self.rows - 1))];
+                let rows = [gap.saturating_sub(1), gap.min(self.rows - 1)];
                 let (top, bottom) = self.gap(gap);
                 // one panel at a time: all rings of a gap would burden the stack
                 let bounds = [top, turn.min(top).max(bottom), (-turn).min(top).max(bottom), bottom];
@@ -202,7 +349,7 @@ impl<'a> Table<'a> {
     fn add_gap(
         &self,
         rings: &Rings,
-        rows: [&[f32]; 2],
+        rows: [usize; 2],
         first: f64,
         size: f64,
         moments: &[[f64; 2]; 2],
@@ -229,9 +376,17 @@ impl<'a> Table<'a> {
                 rings.part(&Cell { start, size, cos: [here.0, ahead.0], sin: [here.1, ahead.1] })
             };
             let next = if column + 1 == self.columns { 0 } else { column + 1 };
-            let corner = |row: usize, column: usize| {
-                rows.at(row).get(column * self.bands..(column + 1) * self.bands).unwrap_or(&[])
-            };
+            if let Some(spot) = &self.spot
+                && rows.iter().any(|row| self.taken(spot, *row, column) + self.taken(spot, *row, next) > 0.0)
+            {
+                for (band, sum) in sums.iter_mut().enumerate() {
+                    let of = |row: usize, column: usize| self.left(rows.at(row), column, band);
+                    let corners = [of(0, column), of(0, next), of(1, column), of(1, next)];
+                    *sum += weights.iter().zip(corners).map(|(weight, value)| weight * value).sum::<f64>();
+                }
+                continue;
+            }
+            let corner = |row: usize, column: usize| self.sample(rows.at(row), column);
             let upper = corner(0, column).iter().zip(corner(0, next));
             let samples = upper.zip(corner(1, column).iter().zip(corner(1, next)));
             for (sum, ((&a, &b), (&c, &d))) in sums.iter_mut().zip(samples) {

@@ -38,6 +38,9 @@ const PARTS: usize = 8;
 /// Error to reach, in tolerances.
 const GOAL: f64 = 0.5;
 
+/// Rays from points find what lobes up to this axis ratio throw of the sun; what narrower ones throw, few of them see.
+const WIDE: f64 = 20.0;
+
 /// Square of the error of the mean of all rays over what their parts' differences tell: what is small and bright, or dark,
 /// few of them see.
 const DOUBT: f64 = 3.0;
@@ -190,13 +193,13 @@ pub(super) struct Spot<'a> {
 
 impl Solved<'_> {
     /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
-    /// holds: not what lobes and curved mirrors throw of the sun, nor flat ones where there are too many.
+    /// holds: not what narrow lobes and curved mirrors throw of the sun, nor flat ones where there are too many.
     #[inline]
     pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
         let most = self.settings.gather * self.settings.tolerance;
         self.gathers()
             && weight * weight * variance > most * most
-            && (self.light.sun.is_none() || self.mirrors_are_flat() && self.knows_images(surface))
+            && (self.light.sun.is_none() || self.finds_thrown_sun() && self.knows_images(surface))
     }
 
     /// Whether any point may want rays.
@@ -207,13 +210,15 @@ impl Solved<'_> {
 
     pub(super) fn knows_images(&self, surface: &Surface) -> bool {
         let side = surface.facet * self.scene.sides() + surface.side;
-        self.images.are_known(self.elements.facet_sides(), side)
+        self.images.are_known(side)
     }
 
-    fn mirrors_are_flat(&self) -> bool {
+    /// Whether rays from points find what mirrors throw of the sun beside its images.
+    fn finds_thrown_sun(&self) -> bool {
         let mut materials = 0..self.scene.materials();
         self.scene.largest_specular() == 0.0
-            || !self.scene.is_smooth() && materials.all(|material| self.scene.gloss(material).is_none())
+            || !self.scene.is_smooth()
+                && materials.all(|m| self.scene.gloss(m).is_none_or(|ratio| ratio <= WIDE))
     }
 
     /// By how much the irradiance at a point differs from its element's, one value a band, and the expected squared error

@@ -211,7 +211,7 @@ impl Solved<'_> {
 
     /// Whether mirrors show a point that looks `toward` it the sun whose middle seems to stand in the direction `axis`,
     /// and the product of the reflectances of those that it meets, at most `most`.
-    fn mirrored_sun(
+    pub(in crate::view) fn mirrored_sun(
         &self,
         sun: &Sun<'_>,
         from: &Surface,
@@ -319,7 +319,7 @@ impl Solved<'_> {
     }
 
     /// What a highlight of the value 1 brings to a chain, relative to the reference radiance.
-    fn gloss_at_stake(&self, through: &[f64; MAX_BANDS], sun: &Sun<'_>) -> f64 {
+    pub(super) fn gloss_at_stake(&self, through: &[f64; MAX_BANDS], sun: &Sun<'_>) -> f64 {
         let mut largest: f64 = 0.0;
         for (band, (through, reference)) in through.iter().zip(self.reference).enumerate() {
             let value = through * sun.irradiance(band);

@@ -1,0 +1,370 @@
+//! What a signature shows of the sun in mirrors and narrow lobes, facet by facet: a glint may be far smaller than a cell.
+//!
+//! Where the sun or one of its images stands is known, and so is the direction that every point of a facet mirrors toward
+//! the observer. A facet is halved until that direction is linear over each part; what the disc takes of a part is then a
+//! chord of a circle on each of some lines across it. Lobes are summed over parts that are small against the angle to the
+//! disc. Whether a point is seen and lit, rays tell.
+
+use super::Sums;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, clamp, frame, pow, sin, sqrt};
+use crate::base::qmc::{Sequence, hash2};
+use crate::rays::surface::Surface;
+use crate::scene::lobe::{Highlight, Lobe};
+use crate::scene::sun::Sun;
+use crate::scene::{MAX_BANDS, Scene};
+use crate::view::chain::{APART, Path, Solved};
+
+/// Facets of one row of a view that looks for glints.
+pub(super) const FACETS: usize = 64;
+
+/// Halvings of a facet's sides at most.
+const DEEPEST: u32 = 9;
+
+/// Parts that wait at most: three of each halving, and one.
+const WAITING: usize = 3 * DEEPEST as usize + 1;
+
+/// A part over which the mirrored direction bends by less than this, in half angles of the disc, is linear: its glint is
+/// off by some such share.
+const BEND: f64 = 0.004;
+
+/// A part may show so many times the disc.
+const WIDE: f64 = 1.5;
+
+/// Lines across a part, and where rays from them disagree.
+const LINES: (u32, u32) = (64, 1024);
+
+/// Sums over parts of a lobe: those whose angle is less than this share of that to the disc are small.
+const SMALL: f64 = 0.3;
+
+/// What a part may bring, in tolerances of the reference radiance over the whole view, to be halved no more.
+const FAINT: f64 = 1e-3;
+
+/// Whether any facet shows the sun apart from the rays through cells.
+pub(super) fn are_wanted(solved: &Solved<'_>) -> bool {
+    solved.light.sun.is_some()
+        && solved.settings.max_bounces != Some(0)
+        && (0..solved.scene.materials()).any(|material| is_apart(solved.scene, material))
+}
+
+/// Whether a material's glints are found here: an ideal mirror, or a lobe that is narrow.
+fn is_apart(scene: &Scene<'_>, material: usize) -> bool {
+    scene.mirror(material) != crate::scene::NO_MIRROR
+        && scene.gloss(material).is_none_or(|ratio| ratio >= APART)
+}
+
+/// Three points in a facet's barycentric weights, and how often its sides were halved for them.
+#[derive(Clone, Copy)]
+struct Part {
+    corners: [(f64, f64); 3],
+    depth: u32,
+}
+
+impl Part {
+    /// The point of barycentric weights within the part.
+    fn at(&self, u: f64, v: f64) -> (f64, f64) {
+        let [a, b, c] = self.corners;
+        let w = 1.0 - u - v;
+        (w * a.0 + u * b.0 + v * c.0, w * a.1 + u * b.1 + v * c.1)
+    }
+
+    /// Its share of the facet.
+    fn share(&self) -> f64 {
+        1.0 / (1u64 << (2 * self.depth)) as f64
+    }
+
+    /// Its four quarters.
+    fn quarters(&self) -> [Part; 4] {
+        let [a, b, c] = self.corners;
+        let (p, q, r) = (self.at(0.5, 0.0), self.at(0.5, 0.5), self.at(0.0, 0.5));
+        [[a, p, r], [p, b, q], [r, q, c], [q, r, p]].map(|corners| Part { corners, depth: self.depth + 1 })
+    }
+}
+
+/// The looks for glints along one direction.
+pub(super) struct Glints<'a, 'w> {
+    pub solved: &'a Solved<'a>,
+    /// From the observer toward the object.
+    pub forward: Vec3,
+    /// Area of the whole view, in the caller's square units.
+    pub whole: f64,
+    /// Products of the reflectances on the way to an image, and sums of what is seen of it.
+    pub products: &'w mut [[f64; MAX_BANDS]; 2],
+}
+
+/// One facet's side, and the sun or an image of it.
+struct Seen<'s> {
+    facet: usize,
+    side: usize,
+    /// Projected, in the caller's square units.
+    area: f64,
+    sun: Sun<'s>,
+    /// Whether it is the sun itself.
+    straight: bool,
+    /// Mirrors that may follow.
+    most: u32,
+}
+
+impl Glints<'_, '_> {
+    /// Adds what the facets of a row show.
+    pub fn row(&mut self, row: usize, sums: &mut Sums) {
+        let scene = self.solved.scene;
+        let end = ((row + 1) * FACETS).min(scene.facets());
+        for facet in row * FACETS..end {
+            if !is_apart(scene, scene.material(facet)) || scene.areas().at(facet) == 0.0 {
+                continue;
+            }
+            let cosine = -scene.side_normal(facet, 0).dot(self.forward);
+            let side = usize::from(cosine < 0.0);
+            if cosine != 0.0 && side < scene.sides() {
+                self.facet(facet, side, scene.area(facet) * cosine.abs(), sums);
+            }
+        }
+    }
+
+    fn facet(&mut self, facet: usize, side: usize, area: f64, sums: &mut Sums) {
+        let solved = self.solved;
+        let (Some(sun), scene) = (&solved.light.sun, solved.scene) else { return };
+        let surface = Surface::new(scene, facet, side, 1.0 / 3.0, 1.0 / 3.0);
+        let Some(mirror) = surface.mirror(scene) else { return };
+        let most = solved.settings.max_bounces.map_or(u32::MAX, |most| most - 1);
+        let place = facet * scene.sides() + side;
+        let images = solved.images.of(solved.elements.facet_sides(), place);
+        let suns = core::iter::once((*sun, true)).chain(images.map(|axis| (sun.seen_toward(axis), false)));
+        for (sun, straight) in suns {
+            if surface.normal.dot(sun.direction()) <= -sin(sun.half_angle()) {
+                continue;
+            }
+            let seen = Seen { facet, side, area, sun, straight, most };
+            match &mirror.lobe {
+                None if sun.is_point() => {}
+                None => self.glint(&seen, sums),
+                Some(lobe) => self.highlight(&seen, lobe, sums),
+            }
+        }
+    }
+
+    /// The direction that a point of a facet mirrors toward the observer.
+    fn mirrored(&self, seen: &Seen<'_>, (u, v): (f64, f64)) -> (Surface, Vec3) {
+        let surface = Surface::new(self.solved.scene, seen.facet, seen.side, u, v);
+        let mirrored = surface.mirrored(self.solved.scene, self.forward);
+        (surface, mirrored)
+    }
+
+    /// Calls `leaf` with the parts of a facet that `halves` does not want halved.
+    fn parts(
+        &mut self,
+        mut halves: impl FnMut(&mut Self, &Part) -> Option<bool>,
+        mut leaf: impl FnMut(&mut Self, &Part),
+    ) {
+        let facet = Part { corners: [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth: 0 };
+        let (mut waiting, mut count) = ([facet; WAITING], 1);
+        while count > 0 {
+            count -= 1;
+            let Some(&part) = waiting.get(count) else { return };
+            match halves(self, &part) {
+                None => {}
+                Some(true) if part.depth < DEEPEST => {
+                    for quarter in part.quarters() {
+                        waiting.set(count, quarter);
+                        count += 1;
+                    }
+                }
+                Some(_) => leaf(self, &part),
+            }
+        }
+    }
+
+    /// The sun's disc in an ideal mirror.
+    fn glint(&mut self, seen: &Seen<'_>, sums: &mut Sums) {
+        let (axis, radius) = (seen.sun.direction(), sin(seen.sun.half_angle()));
+        let halves = |this: &mut Self, part: &Part| {
+            let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
+            let middle = this.mirrored(seen, part.at(1.0 / 3.0, 1.0 / 3.0)).1;
+            let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
+            let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
+            // half as far again: the direction bends
+            if off > 1.5 * reach + 1.01 * radius {
+                return None;
+            }
+            let bend = (ends[0] + ends[1] + ends[2]) / 3.0 - middle;
+            Some(sqrt(bend.length_squared()) > BEND * radius || reach > WIDE * radius)
+        };
+        let (first, second) = frame(axis);
+        self.parts(halves, |this, part| {
+            let ends = part.corners.map(|corner| {
+                let mirrored = this.mirrored(seen, corner).1;
+                (mirrored.dot(first) / radius, mirrored.dot(second) / radius)
+            });
+            let radiance = core::array::from_fn(|band| seen.sun.disc_radiance(band));
+            this.lines(seen, part, ends, &radiance, sums);
+        });
+    }
+
+    /// Adds the glint of a part on which the mirrored direction is linear: `ends` are those of its corners, in half widths
+    /// of the disc from its middle.
+    fn lines(
+        &mut self,
+        seen: &Seen<'_>,
+        part: &Part,
+        [a, b, c]: [(f64, f64); 3],
+        radiance: &[f64; MAX_BANDS],
+        sums: &mut Sums,
+    ) {
+        let bands = self.solved.shape.bands;
+        let sequence = Sequence::new(hash2(seen.facet as u32, part.depth));
+        let mut lines = LINES.0;
+        loop {
+            let (mut all, mut lit) = (0.0, 0.0);
+            self.products[1].head_mut(bands).fill(0.0);
+            for line in 0..lines {
+                let u = (f64::from(line) + 0.5) / f64::from(lines);
+                let start = (a.0 + u * (b.0 - a.0), a.1 + u * (b.1 - a.1));
+                let along = ((1.0 - u) * (c.0 - a.0), (1.0 - u) * (c.1 - a.1));
+                let Some((from, to)) = chord(start, along) else { continue };
+                let share = 2.0 * (1.0 - u) / f64::from(lines) * (to - from);
+                all += share;
+                let (place, _) = sequence.pair(line, 0);
+                let (surface, toward) =
+                    self.mirrored(seen, part.at(u, (1.0 - u) * (from + place * (to - from))));
+                if self.is_lit(seen, &surface, toward, sums) {
+                    lit += share;
+                    let [products, sum] = &mut *self.products;
+                    sum.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
+                }
+            }
+            let partly = lit > 0.0 && lit < all;
+            if partly && lines < LINES.1 {
+                lines *= 4;
+                continue;
+            }
+            let off = if partly { sqrt(lit * (all - lit)) * pow(f64::from(lines), -0.75) } else { 0.0 };
+            self.add(seen, part.share(), (radiance, off), sums);
+            return;
+        }
+    }
+
+    /// The sun in a lobe.
+    fn highlight(&mut self, seen: &Seen<'_>, lobe: &Lobe, sums: &mut Sums) {
+        let (axis, solved) = (seen.sun.direction(), self.solved);
+        let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
+        let scale = self.scale(seen);
+        let faint = FAINT * solved.settings.tolerance * self.whole;
+        let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
+        let halves = |this: &mut Self, part: &Part| {
+            let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
+            let middle = this.mirrored(seen, part.at(1.0 / 3.0, 1.0 / 3.0)).1;
+            let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
+            let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
+            let nearest = (off - 1.5 * reach).max(0.0);
+            // the lobe as high as at the nearest point
+            let most = lobe.value(1.0 - 0.5 * nearest * nearest);
+            Some(reach > SMALL * (off + width) && brings(most, part) > faint)
+        };
+        self.parts(halves, |this, part| this.points(seen, lobe, part, (scale, faint), sums));
+    }
+
+    /// Adds what a small part shows of the sun in a lobe, by points of it.
+    fn points(
+        &mut self,
+        seen: &Seen<'_>,
+        lobe: &Lobe,
+        part: &Part,
+        (scale, faint): (f64, f64),
+        sums: &mut Sums,
+    ) {
+        let bands = self.solved.shape.bands;
+        let sequence = Sequence::new(hash2(seen.facet as u32, 0x5000 + part.depth));
+        let (mut all, mut lit, mut count, mut goal) = (0.0, 0.0, 0u32, 1);
+        self.products[1].head_mut(bands).fill(0.0);
+        while count < goal {
+            let [u, v] = POINTS.at(count as usize % POINTS.len());
+            let (surface, mirrored) = self.mirrored(seen, part.at(u, v));
+            let highlight = Highlight::new(lobe, mirrored, &seen.sun);
+            let value = highlight.map_or_else(|| lobe.value(mirrored.dot(seen.sun.direction())), |h| h.value);
+            let (x, y) = sequence.pair(count, 2);
+            let toward = highlight.map_or_else(|| seen.sun.sample(x, y), |h| h.sample(x, y));
+            all += value;
+            if value > 0.0 && self.is_lit(seen, &surface, toward, sums) {
+                lit += value;
+                let [products, sum] = &mut *self.products;
+                sum.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += value * p);
+            }
+            count += 1;
+            // what brings little is looked at once
+            if count == 1 && scale * value * part.share() * seen.area > faint {
+                goal = POINTS.len() as u32;
+            }
+        }
+        let share = 1.0 / f64::from(count);
+        self.products[1].head_mut(bands).iter_mut().for_each(|sum| *sum *= share);
+        let off = if lit > 0.0 && lit < all { sqrt(lit * (all - lit)) * pow(share, 1.5) } else { 0.0 };
+        let irradiance = core::array::from_fn(|band| seen.sun.irradiance(band));
+        self.add(seen, part.share(), (&irradiance, off), sums);
+    }
+
+    /// What a lobe's value of 1 brings, the most over the bands relative to the reference radiance.
+    fn scale(&self, seen: &Seen<'_>) -> f64 {
+        let specular = self.solved.scene.specular(self.solved.scene.material(seen.facet));
+        let values = specular.iter().enumerate().zip(self.solved.reference);
+        let scale = |((band, rho), reference): ((usize, &f64), &f64)| match *reference > 0.0 {
+            true => rho * seen.sun.irradiance(band) / reference,
+            false => 0.0,
+        };
+        values.map(scale).fold(0.0, f64::max)
+    }
+
+    /// Whether the observer sees a point, and it the sun in the direction that it mirrors; the product of the reflectances
+    /// on the way there.
+    fn is_lit(&mut self, seen: &Seen<'_>, surface: &Surface, toward: Vec3, sums: &mut Sums) -> bool {
+        let solved = self.solved;
+        sums.rays += 1;
+        if toward.dot(surface.normal) <= 0.0 || solved.bvh.occluded(&surface.leave(-self.forward)) {
+            return false;
+        }
+        let [products, _] = &mut *self.products;
+        if seen.straight {
+            products.head_mut(solved.shape.bands).fill(1.0);
+            sums.rays += 1;
+            return !solved.bvh.occluded(&surface.leave(toward));
+        }
+        let (Some(sun), mut path) = (&solved.light.sun, Path::default()) else { return false };
+        let lit =
+            solved.mirrored_sun(sun, surface, (toward, seen.sun.direction()), seen.most, products, &mut path);
+        sums.rays += u64::from(path.rays);
+        lit
+    }
+
+    /// Adds a part's light, whose sums are known; `off` is what its share is expected to be wrong by.
+    fn add(&self, seen: &Seen<'_>, share: f64, (light, off): (&[f64; MAX_BANDS], f64), sums: &mut Sums) {
+        let specular = self.solved.scene.specular(self.solved.scene.material(seen.facet));
+        for (band, rho) in specular.iter().enumerate() {
+            let each = seen.area * share * rho * light.at(band);
+            let value = sums.intensity.at(band) + each * self.products[1].at(band);
+            sums.intensity.set(band, value);
+            let doubt = sums.doubt2.at(band) + (each * off) * (each * off);
+            sums.doubt2.set(band, doubt);
+        }
+    }
+}
+
+/// Points of a part whose mean is exact for quadratic functions.
+const POINTS: [[f64; 2]; 3] = [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
+
+/// The part of a line from `start` over `along` that is in the unit circle.
+fn chord(start: (f64, f64), along: (f64, f64)) -> Option<(f64, f64)> {
+    let square = along.0 * along.0 + along.1 * along.1;
+    let inside = 1.0 - (start.0 * start.0 + start.1 * start.1);
+    // so short that it is a point
+    if square < 1e-18 {
+        return (inside >= 0.0).then_some((0.0, 1.0));
+    }
+    let half = -(start.0 * along.0 + start.1 * along.1) / square;
+    let root = half * half + inside / square;
+    if root <= 0.0 {
+        return None;
+    }
+    let root = sqrt(root);
+    let (from, to) = (clamp(half - root, 0.0, 1.0), clamp(half + root, 0.0, 1.0));
+    (from < to).then_some((from, to))
+}
