@@ -13,6 +13,9 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// The name that the shared library gives itself: its file's name with what a change of the interface changes.
+const SONAME: &str = "libblik.so.0.1";
+
 /// The folder of `libblik.a` and `libblik.so`, built once.
 fn library() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
@@ -25,8 +28,14 @@ fn library() -> &'static Path {
             .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         // this test's program is target/PROFILE/deps/NAME
-        let target = std::env::current_exe().unwrap().ancestors().nth(3).unwrap().to_path_buf();
-        target.join("debug")
+        let folder = std::env::current_exe().unwrap().ancestors().nth(3).unwrap().join("debug");
+        #[cfg(unix)]
+        {
+            // programs look for the name that the library gives itself
+            let _ = std::fs::remove_file(folder.join(SONAME));
+            std::os::unix::fs::symlink("libblik.so", folder.join(SONAME)).unwrap();
+        }
+        folder
     })
 }
 
@@ -85,7 +94,7 @@ fn c_programs_run_as_every_standard() {
 
 #[test]
 fn cpp_programs_run_as_every_standard() {
-    for program in ["interface.cpp", "owners.cpp"] {
+    for program in ["interface.cpp", "owners.cpp", "arrays.cpp", "callbacks.cpp"] {
         let source = root().join("tests/c").join(program);
         for compiler in ["c++", "clang++"] {
             for standard in ["c++17", "c++20", "c++2b"].iter().filter(|s| knows(compiler, s)) {
@@ -94,6 +103,149 @@ fn cpp_programs_run_as_every_standard() {
             }
         }
     }
+}
+
+/// A program of a header that knew fewer members than the library does.
+#[test]
+fn programs_of_older_headers_keep_their_memory() {
+    let source = root().join("tests/c/older.c");
+    for link in [Link::Static, Link::Shared] {
+        assert_eq!(run("cc", "c11", &source, link, &[]), "ok\n");
+    }
+}
+
+/// What the compiler is to refuse, and the words that it is to say: the declarations around it are well without it.
+const REFUSED: [(&str, &str); 12] = [
+    ("blik::coupling bad{blik::scene{mesh}};", "delete"),
+    ("blik::coupling bad(make());", "delete"),
+    ("blik::solution bad{blik::coupling{scene}, light};", "delete"),
+    ("const blik::scene &bad = blik::loaded(block).scene(); (void)bad;", "delete"),
+    ("const blik::solution *bad = blik::loaded(block).solution(); (void)bad;", "delete"),
+    ("blik::loaded bad{std::vector<unsigned char>(9)};", "delete"),
+    ("blik_run bad = blik::progress([](double) { return true; }).on(); (void)bad;", "delete"),
+    ("blik_light bad = blik::light(blik::sky()).get(); (void)bad;", "delete"),
+    ("blik::mesh bad(columns<-1, 3>(), indices);", "column-major"),
+    ("blik::mesh bad(columns<-1, -1>(), indices);", "column-major"),
+    ("blik::mesh bad(columns<3, 3>(), indices);", "as many rows as columns"),
+    ("blik::mesh bad(std::vector<four>(3), indices);", "no number and no struct"),
+];
+
+/// Temporaries whose address would be kept, matrices whose order is not the entries', and structs of other numbers do not
+/// compile.
+#[test]
+fn what_would_dangle_or_be_read_wrongly_does_not_compile() {
+    if !knows("c++", "c++17") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let compile = |line: &str| {
+        let file = folder.path().join("refused.cpp");
+        let text = format!(
+            "#include <blik.hpp>\n#include <vector>\nstruct four {{ double a, b, c, d; }};\n\
+             template <int R, int C> struct columns {{ using Scalar = double;\n\
+             enum {{ RowsAtCompileTime = R, ColsAtCompileTime = C, IsRowMajor = 0 }};\n\
+             long rows() const {{ return 3; }} long cols() const {{ return 3; }} long size() const {{ return 9; }}\n\
+             long innerStride() const {{ return 1; }} long outerStride() const {{ return 3; }}\n\
+             const double *data() const {{ return nullptr; }} }};\n\
+             inline void test(const blik::mesh &mesh, const blik::scene &scene, const blik::block &block,\n\
+             const blik::light &light, const std::vector<int> &indices, blik::scene (*make)()) {{\n\
+             (void)mesh, (void)scene, (void)block, (void)light, (void)indices, (void)make;\n{line}\n}}\n"
+        );
+        std::fs::write(&file, text).unwrap();
+        let mut command = Command::new("c++");
+        command.args(["-std=c++17", "-fsyntax-only", "-I"]).arg(root().join("include")).arg(&file);
+        command.output().unwrap()
+    };
+    let well = compile("blik::mesh good(columns<3, -1>(), indices);");
+    assert!(well.status.success(), "{}", text(&well));
+    for (line, words) in REFUSED {
+        let output = compile(line);
+        assert!(!output.status.success(), "compiles: {line}");
+        assert!(text(&output).contains(words), "{line}:\n{}", text(&output));
+    }
+}
+
+/// A struct of the caller as its inline function of the header set it, as Rust shows it.
+fn shown<T: std::fmt::Debug + Copy>(bytes: &[u8]) -> String {
+    assert_eq!(bytes.len(), size_of::<T>());
+    // SAFETY: numbers, null pointers and null functions: any bytes of C's struct are one of Rust's.
+    format!("{:?}", unsafe { bytes.as_ptr().cast::<T>().read_unaligned() })
+}
+
+/// The header's defaults are the library's.
+#[test]
+fn inline_functions_set_the_librarys_defaults() {
+    type Shown = fn(&[u8]) -> String;
+    macro_rules! structs {
+        ($($name:ident $(($argument:literal))?),*) => {
+            [$((
+                stringify!($name),
+                concat!("" $(, ", ", $argument)?),
+                size_of::<blik::$name>(),
+                shown::<blik::$name> as Shown,
+                format!("{:?}", blik::$name::default()),
+            )),*]
+        };
+    }
+    // a report or info has its size alone set, and is not here
+    let all = structs![
+        blik_run,
+        blik_mesh,
+        blik_ray,
+        blik_intersector,
+        blik_settings,
+        blik_sky,
+        blik_sun,
+        blik_light,
+        blik_camera,
+        blik_tally,
+        blik_rounds("2e-3"),
+        blik_plane_material,
+        blik_plane_body,
+        blik_plane_bodies,
+        blik_plane_settings,
+        blik_plane_sky,
+        blik_plane_sun,
+        blik_plane_light
+    ];
+    let mut source = String::from("#include <blik_plane.h>\n#include <stdio.h>\nint main(void) {\n");
+    for (name, argument, ..) in &all {
+        source += &format!(
+            "    {{ static {name} value; {name}_init(&value{argument}); fwrite(&value, sizeof value, 1, stdout); }}\n"
+        );
+    }
+    source += "    return 0;\n}\n";
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("defaults.c");
+    std::fs::write(&file, source).unwrap();
+    let program = folder.path().join("defaults");
+    let mut command = Command::new("cc");
+    command.arg("-I").arg(root().join("include")).arg(&file).arg("-o").arg(&program);
+    let compiled = command.output().unwrap();
+    assert!(compiled.status.success(), "{}", text(&compiled));
+    let bytes = Command::new(&program).output().unwrap().stdout;
+    let mut rest = &bytes[..];
+    for (name, _, size, shown, expected) in &all {
+        let (own, after) = rest.split_at(*size);
+        assert_eq!(shown(own), *expected, "{name}");
+        rest = after;
+    }
+    assert!(rest.is_empty());
+    // and none is left out that sets more than its size
+    let counted = header().matches("static inline void blik_").count()
+        - header().matches("Sets struct_size of").count();
+    assert_eq!(counted, all.len());
+}
+
+#[test]
+fn the_smallest_program_in_c_has_at_most_fifty_lines_and_runs() {
+    let source = root().join("ffi/examples/minimal.c");
+    assert!(std::fs::read_to_string(&source).unwrap().lines().count() <= 50);
+    let printed = run("cc", "c99", &source, Link::Static, &[]);
+    let lines: Vec<&str> = printed.lines().collect();
+    assert!(lines.len() == 24 && lines.iter().all(|line| line.len() == 48), "{printed}");
+    // the sky around, and a floor that is darker
+    assert!(lines[0].contains('@') && lines[14].contains('='), "{printed}");
 }
 
 #[test]
@@ -139,8 +291,10 @@ fn the_examples_do_what_they_say() {
     assert!(pictures[0] == pictures[1], "the picture depends on the number of threads");
 }
 
+/// All headers, one after the other.
 fn header() -> String {
-    std::fs::read_to_string(root().join("include/blik.h")).unwrap()
+    let read = |name| std::fs::read_to_string(root().join("include").join(name)).unwrap();
+    ["blik.h", "blik_form_factor.h", "blik_plane.h"].map(read).concat()
 }
 
 /// The header without comments, its white space single blanks.
@@ -155,16 +309,9 @@ fn bare() -> String {
     lines.flat_map(str::split_whitespace).collect::<Vec<_>>().join(" ")
 }
 
-/// Prototypes of all functions.
+/// Prototypes of all functions of the library.
 fn prototypes() -> Vec<String> {
-    let bare = bare();
-    let statements = bare.split(';').map(|s| s.trim().trim_start_matches("extern \"C\" {").trim());
-    statements
-        .filter(|s| s.contains(" blik_") || s.contains("*blik_"))
-        .filter(|s| s.ends_with(')'))
-        .filter(|s| !s.starts_with("typedef"))
-        .map(String::from)
-        .collect()
+    bare().split(';').filter_map(|s| s.split("BLIK_API ").nth(1)).map(|s| s.trim().to_string()).collect()
 }
 
 fn name(prototype: &str) -> String {
@@ -177,6 +324,14 @@ fn symbols(arguments: &[&str], file: &str) -> BTreeSet<String> {
     let output = Command::new("nm").args(arguments).arg(library().join(file)).output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     text.lines().filter_map(|l| l.split_whitespace().nth(2)).map(String::from).collect()
+}
+
+#[test]
+fn the_shared_library_has_a_soname() {
+    let output = Command::new("readelf").arg("-d").arg(library().join("libblik.so")).output().unwrap();
+    assert!(text(&output).contains(&format!("soname: [{SONAME}]")), "{}", text(&output));
+    let [major, minor] = [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR")];
+    assert_eq!(SONAME, format!("libblik.so.{major}.{minor}"));
 }
 
 #[test]
@@ -207,7 +362,9 @@ fn structs() -> Vec<(String, Vec<String>)> {
 
 /// Sizes and offsets as the C compiler has them, constants and prototypes as the header has them.
 fn interface() -> String {
-    let mut source = String::from("#include <blik.h>\n#include <stdio.h>\nint main(void) {\n");
+    let mut source = String::from(
+        "#include <blik_form_factor.h>\n#include <blik_plane.h>\n#include <stdio.h>\nint main(void) {\n",
+    );
     for (name, members) in structs() {
         source += &format!("    printf(\"struct {name}: %zu\\n\", sizeof({name}));\n");
         for member in members {
@@ -230,6 +387,8 @@ fn interface() -> String {
     let header = header();
     let constants = header.lines().filter(|l| l.starts_with("#define BLIK_") && l.split(' ').count() == 3);
     constants.filter(|l| !l.contains("VERSION")).for_each(|l| all += &format!("{l}\n"));
+    let choices = header.lines().filter(|l| l.starts_with("    BLIK_") && l.contains(" = "));
+    choices.for_each(|l| all += &format!("{}\n", l.split(',').next().unwrap().trim()));
     prototypes().iter().for_each(|p| all += &format!("{p}\n"));
     all
 }

@@ -14,7 +14,6 @@ use blik_kernel::sky::{SkyInput, SkyModel};
 use blik_kernel::sun::SunInput;
 use case::{Case, SkyOf, SunOf, orthographic, within};
 use std::ffi::{CStr, c_void};
-use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use support::scenes;
 use support::twin::Material;
@@ -39,16 +38,6 @@ fn view() -> CameraInput {
     CameraInput { sampling: Sampling::Area, ..camera }
 }
 
-/// A struct with the defaults that its init function sets.
-fn init<T>(init: unsafe extern "C" fn(*mut T)) -> T {
-    let mut value = MaybeUninit::uninit();
-    // SAFETY: the init function writes a whole value.
-    unsafe {
-        init(value.as_mut_ptr());
-        value.assume_init()
-    }
-}
-
 /// The kernel's input as C has it; the arrays stay the input's.
 struct Arrays {
     mesh: blik_mesh,
@@ -71,7 +60,7 @@ fn mesh(input: &SceneInput<'_>) -> Arrays {
             gloss_rays: m.gloss.and_then(|g| g.rays).unwrap_or(0),
         })
         .collect();
-    let mut mesh = init(blik_mesh_init);
+    let mut mesh = blik_mesh::default();
     mesh.vertices = array(input.vertices, BLIK_F64);
     mesh.facets = array(input.facets, BLIK_U32);
     mesh.facet_materials = array(input.facet_materials, BLIK_U32);
@@ -83,7 +72,7 @@ fn mesh(input: &SceneInput<'_>) -> Arrays {
 }
 
 fn camera(input: &CameraInput) -> blik_camera {
-    let mut camera = init(blik_camera_init);
+    let mut camera = blik_camera::default();
     (camera.eye, camera.target, camera.up) = (input.eye, input.target, input.up);
     (camera.columns, camera.rows) = (input.columns, input.rows);
     match input.projection {
@@ -96,25 +85,25 @@ fn camera(input: &CameraInput) -> blik_camera {
 }
 
 fn sky(input: &SkyInput<'_>) -> blik_sky {
-    let mut sky = init(blik_sky_init);
+    let mut sky = blik_sky::default();
     sky.model = BLIK_SKY_OVERCAST;
     (sky.radiance, sky.ground, sky.up) = (input.radiance.as_ptr(), input.ground.as_ptr(), input.up);
     sky
 }
 
 fn sun(input: &SunInput<'_>) -> blik_sun {
-    let mut sun = init(blik_sun_init);
+    let mut sun = blik_sun::default();
     (sun.direction, sun.half_angle_deg) = (input.direction, input.half_angle_deg);
     sun.irradiance = input.irradiance.as_ptr();
     sun
 }
 
 fn settings(tolerance: f64) -> blik_settings {
-    blik_settings { tolerance, ..init(blik_settings_init) }
+    blik_settings { tolerance, ..blik_settings::default() }
 }
 
 fn threads(lanes: usize) -> blik_run {
-    blik_run { parallel: Some(blik_run_on_threads), lanes, ..init(blik_run_init) }
+    blik_run { parallel: Some(blik_run_on_threads), lanes, ..blik_run::default() }
 }
 
 #[track_caller]
@@ -138,7 +127,7 @@ fn run(case: &Case, tolerance: f64, run: &blik_run, own: bool) -> Results {
     case.with_input(|input| {
         let arrays = mesh(input);
         let (sky, sun) = (sky(&case.sky.as_ref().unwrap().input()), sun(&case.sun.as_ref().unwrap().input()));
-        let light = blik_light { sky: &sky, sun: &sun, ..init(blik_light_init) };
+        let light = blik_light { sky: &sky, sun: &sun, ..blik_light::default() };
         let (settings, camera) = (settings(tolerance), camera(&view()));
         let mut error = blik_error::default();
         // SAFETY: all pointers are to values above; memory outlives the handles in it.
@@ -158,11 +147,11 @@ fn run(case: &Case, tolerance: f64, run: &blik_run, own: bool) -> Results {
             done(blik_scene_size(&arrays.mesh, &mut error, &mut bytes), &error);
             let mut memory = [vec![0xa5u8; bytes], vec![], vec![], vec![]];
             let [own, coupled, lit, scratch] = &mut memory;
-            let mut scene = null();
+            let mut scene = null_mut();
             let at = |memory: &mut Vec<u8>| memory.as_mut_ptr().cast::<c_void>();
             done(blik_scene_init(&arrays.mesh, at(own), bytes, &mut error, &mut scene), &error);
             done(blik_coupling_size(scene, &settings, &mut error, &mut bytes), &error);
-            let (mut coupling, mut tries) = (null(), 0);
+            let (mut coupling, mut tries) = (null_mut(), 0);
             loop {
                 coupled.resize(bytes, 0xa5);
                 let status =
@@ -178,7 +167,7 @@ fn run(case: &Case, tolerance: f64, run: &blik_run, own: bool) -> Results {
             }
             done(blik_solution_size(coupling, &light, &mut error, &mut bytes), &error);
             *lit = vec![0xa5; bytes];
-            let mut solution = null();
+            let mut solution = null_mut();
             let status = blik_solution_init(coupling, &light, run, at(lit), bytes, &mut error, &mut solution);
             done(status, &error);
             done(blik_image_scratch_size(solution, &camera, run, &mut error, &mut bytes), &error);
@@ -206,17 +195,23 @@ unsafe fn views(
     let facets = input.facets.len();
     let (mut irradiance, mut radiance) = (vec![0.0; facets * input.bands], vec![0.0; facets * input.bands]);
     let forward: [f64; 3] = std::array::from_fn(|k| camera.target[k] - camera.eye[k]);
+    let (mut tally, mut report) = (blik_tally::default(), blik_report::default());
     // SAFETY: all are numbers.
-    let (mut tally, mut report, mut signatures): (blik_tally, blik_report, [blik_signature; 3]) =
-        unsafe { std::mem::zeroed() };
+    let mut signatures: [blik_signature; 3] = unsafe { std::mem::zeroed() };
     // SAFETY: arrays as long as stated.
     unsafe {
         let (p, c) = (pixels.as_mut_ptr(), components.as_mut_ptr());
-        done(blik_image(solution, camera, run, scratch, size, &mut error, p, count, c, &mut tally), &error);
+        let t = &raw mut tally;
+        done(blik_image(solution, camera, run, scratch, size, &mut error, p, count, c, 3 * count, t), &error);
         let (e, l) = (irradiance.as_mut_ptr(), radiance.as_mut_ptr());
-        done(blik_facets(solution, 0, facets, &mut error, null_mut(), e, l), &error);
+        let n = irradiance.len();
+        done(blik_facets(solution, 0, facets, &mut error, null_mut(), 0, e, n, l, n), &error);
         let s = signatures.as_mut_ptr();
-        done(blik_signatures(solution, forward.as_ptr(), 1, 0, run, null_mut(), 0, &mut error, s), &error);
+        let (from, stride) = (forward.as_ptr(), size_of::<blik_signature>());
+        done(
+            blik_signatures(solution, from, 1, 0, run, null_mut(), 0, &mut error, s, input.bands, stride),
+            &error,
+        );
         done(blik_get_report(solution, &tally, &mut error, &mut report), &error);
         rows_agree(solution, camera, &pixels, &tally);
     }
@@ -243,12 +238,12 @@ unsafe fn rows_agree(solution: *const blik_solution, camera: &blik_camera, whole
         // SAFETY: arrays as long as stated.
         let status = unsafe {
             let (p, t) = (pixels.as_mut_ptr(), &raw mut tally);
-            blik_image_rows(solution, camera, row, 1, null_mut(), 0, &mut error, p, stride, null_mut(), t)
+            blik_image_rows(solution, camera, row, 1, null_mut(), 0, &mut error, p, stride, null_mut(), 0, t)
         };
         done(status, &error);
         assert!(pixels == whole[row * stride..(row + 1) * stride], "row {row}");
         // SAFETY: both are valid.
-        unsafe { blik_tally_add(&mut sum, &tally) };
+        done(unsafe { blik_tally_add(&mut sum, &tally, &mut error) }, &error);
     }
     assert_eq!((sum.object_pixels, sum.refined_pixels), (all.object_pixels, all.refined_pixels));
 }
@@ -257,7 +252,7 @@ unsafe fn rows_agree(solution: *const blik_solution, camera: &blik_camera, whole
 fn the_interface_gives_the_owning_layers_bits() {
     let case = case();
     let host = case.run(2, &within(2e-2), &view());
-    let alone = init(blik_run_init);
+    let alone = blik_run::default();
     let first = run(&case, 2e-2, &alone, true);
     assert_eq!(host.pixel_bits(), [&first.pixels[..], &first.components].concat());
     for lanes in [1, 3, 8] {
@@ -281,7 +276,7 @@ fn bounded_bounces_agree_too() {
     case.with_input(|input| {
         let arrays = mesh(input);
         let sky = sky(&case.sky.as_ref().unwrap().input());
-        let light = blik_light { sky: &sky, ..init(blik_light_init) };
+        let light = blik_light { sky: &sky, ..blik_light::default() };
         let settings = blik_settings { max_bounces: 2, ..settings(5e-2) };
         let mut error = blik_error::default();
         let mut images = Vec::new();
@@ -351,9 +346,9 @@ fn strided_single_precision_is_the_same_mesh() {
                 let mut hits: Vec<blik_hit> = Vec::with_capacity(rays.len());
                 let mut any = vec![9u8; rays.len()];
                 let (r, n) = (rays.as_ptr(), rays.len());
-                done(blik_closest_hits(scene, r, n, null(), &mut error, hits.as_mut_ptr()), &error);
+                done(blik_closest_hits(scene, r, n, null(), &mut error, hits.as_mut_ptr(), n), &error);
                 hits.set_len(n);
-                done(blik_any_hits(scene, r, n, &threads(2), &mut error, any.as_mut_ptr()), &error);
+                done(blik_any_hits(scene, r, n, &threads(2), &mut error, any.as_mut_ptr(), n), &error);
                 assert!(hits.iter().zip(&any).all(|(h, a)| (h.facet != BLIK_NO_FACET) == (*a == 1)));
                 hits.iter().map(|h| (h.facet, h.t.to_bits(), h.front)).collect::<Vec<_>>()
             });
@@ -425,6 +420,132 @@ fn refused_calls_say_what_is_wrong_and_write_nothing() {
     });
 }
 
+/// Rays that are none are refused by all who take rays, with the field and the ray's index, and nothing is written.
+#[test]
+fn rays_that_are_none_are_refused() {
+    let case = case();
+    case.with_input(|input| {
+        let arrays = mesh(input);
+        let sky = sky(&case.sky.as_ref().unwrap().input());
+        let light = blik_light { sky: &sky, ..blik_light::default() };
+        let (mut scene, mut coupling, mut solution) = (null_mut(), null_mut(), null_mut());
+        let mut error = blik_error::default();
+        // SAFETY: all pointers are to values above.
+        unsafe {
+            done(blik_scene_create(&arrays.mesh, &mut error, &mut scene), &error);
+            done(blik_coupling_create(scene, &settings(0.1), null(), &mut error, &mut coupling), &error);
+            done(blik_solution_create(coupling, &light, null(), &mut error, &mut solution), &error);
+        }
+        let facets = input.facets.len() as u32;
+        let good = blik_ray { origin: [0.5, 0.5, 3.0], ..blik_ray::default() };
+        // all three, with one ray among good ones; what each says
+        let ask = |ray: blik_ray| {
+            let rays = [good, good, ray, good];
+            let mut radiance = [7.0; 12];
+            // SAFETY: all are numbers.
+            let mut hits: [blik_hit; 4] = unsafe { std::mem::zeroed() };
+            let mut any = [9u8; 4];
+            let mut errors = [blik_error::default(); 3];
+            let r = rays.as_ptr();
+            // SAFETY: arrays as long as stated.
+            let statuses = unsafe {
+                let [a, b, c] = errors.each_mut().map(|e| e as *mut blik_error);
+                let l = radiance.as_mut_ptr();
+                [
+                    blik_radiance(solution, r, 4, null(), null_mut(), 0, a, l, 12),
+                    blik_closest_hits(scene, r, 4, null(), b, hits.as_mut_ptr(), 4),
+                    blik_any_hits(scene, r, 4, null(), c, any.as_mut_ptr(), 4),
+                ]
+            };
+            let written = radiance != [7.0; 12] || hits.iter().any(|h| h.t != 0.0) || any != [9; 4];
+            assert!(statuses.iter().all(|s| *s == statuses[0]), "{statuses:?}");
+            assert_eq!(written, statuses[0] == BLIK_OK);
+            assert!(
+                written || errors.iter().all(|e| (e.index, e.field) == (2, errors[0].field)),
+                "{errors:?}"
+            );
+            (statuses[0], errors[0].field)
+        };
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for k in 0..3 {
+                let mut ray = good;
+                ray.origin[k] = x;
+                assert_eq!(ask(ray), (BLIK_ERROR_RANGE, BLIK_FIELD_RAY_ORIGIN));
+                let mut ray = good;
+                ray.direction[k] = x;
+                assert_eq!(ask(ray), (BLIK_ERROR_DIRECTION, BLIK_FIELD_RAY_DIRECTION));
+            }
+        }
+        for direction in [[0.0; 3], [0.0, 0.0, -3.0], [0.0, 0.0, 0.5], [1e-200, 0.0, 0.0], [1e200; 3]] {
+            assert_eq!(ask(blik_ray { direction, ..good }), (BLIK_ERROR_DIRECTION, BLIK_FIELD_RAY_DIRECTION));
+        }
+        for t_max in [f64::NAN, -1.0, f64::NEG_INFINITY] {
+            assert_eq!(ask(blik_ray { t_max, ..good }), (BLIK_ERROR_RANGE, BLIK_FIELD_RAY_T_MAX));
+        }
+        for skip in [facets, facets + 7, BLIK_NO_FACET - 1] {
+            assert_eq!(ask(blik_ray { skip, ..good }), (BLIK_ERROR_RANGE, BLIK_FIELD_RAY_SKIP));
+        }
+        // a direction that was a unit vector in single precision, no limit, and the last facet to skip
+        let third = f64::from(1.0 / 3f32.sqrt());
+        let direction = [-third, third, -third];
+        for t_max in [0.0, 1.0, f64::MAX, f64::INFINITY] {
+            assert_eq!(ask(blik_ray { t_max, direction, skip: facets - 1, ..good }).0, BLIK_OK);
+        }
+        // SAFETY: used by nobody any more.
+        unsafe {
+            blik_solution_destroy(solution);
+            blik_coupling_destroy(coupling);
+            blik_scene_destroy(scene);
+        }
+    });
+}
+
+/// A struct is as long as it says: nothing behind is read or written, and lengths that never were are refused.
+#[test]
+fn structs_are_as_long_as_they_say() {
+    let case = case();
+    case.with_input(|input| {
+        let arrays = mesh(input);
+        let (mut scene, mut error, mut bytes) = (null_mut(), blik_error::default(), 0);
+        // SAFETY: all pointers are to values above, and room for more than any struct.
+        unsafe {
+            done(blik_scene_create(&arrays.mesh, &mut error, &mut scene), &error);
+            let first = std::mem::offset_of!(blik_settings, image_tolerance);
+            for size in (0..size_of::<blik_settings>() + 64).chain([usize::MAX, 1 << 40]) {
+                // what stands behind would be refused as a tolerance
+                let mut room = [f64::NAN; 32];
+                let at = room.as_mut_ptr().cast::<blik_settings>();
+                at.write(blik_settings { image_tolerance: f64::NAN, ..settings(0.1) });
+                (*at).struct_size = size;
+                let status = blik_coupling_size(scene, at, &mut error, &mut bytes);
+                let whole = size_of::<blik_settings>();
+                let expected = match size {
+                    size if size < first || size > whole => BLIK_ERROR_STRUCT_SIZE,
+                    // the member is read, or a part of it
+                    size if size > first => BLIK_ERROR_RANGE,
+                    _ => BLIK_OK,
+                };
+                // the first bytes of a number may make one that is allowed
+                assert!(status == expected || (size > first && size < whole), "{size}: {status}");
+                if status == BLIK_ERROR_STRUCT_SIZE {
+                    assert_eq!((error.needed, error.given), (whole, size));
+                }
+            }
+            for size in 0..2 * size_of::<blik_scene_info>() {
+                let mut room = [0xa5a5_a5a5_a5a5_a5a5u64; 32];
+                room[0] = size as u64;
+                let before = room;
+                let status = blik_scene_get_info(scene, &mut error, room.as_mut_ptr().cast());
+                let own = size == size_of::<blik_scene_info>();
+                assert_eq!(status, if own { BLIK_OK } else { BLIK_ERROR_STRUCT_SIZE });
+                let words = if own { size / 8 } else { 0 };
+                assert!(room[words..] == before[words..] && room[0] == size as u64);
+            }
+            blik_scene_destroy(scene);
+        }
+    });
+}
+
 unsafe extern "C" fn stop(user: *mut c_void, done: f64) -> i32 {
     // SAFETY: the test's counter.
     let calls = unsafe { &mut *user.cast::<(u32, f64)>() };
@@ -452,7 +573,7 @@ fn progress_rises_to_one_and_can_stop_a_stage() {
             done(blik_scene_create(&arrays.mesh, &mut error, &mut scene), &error);
             let mut calls = (0u32, 0.0f64);
             let user = (&raw mut calls).cast::<c_void>();
-            let run = blik_run { progress: Some(stop), progress_user: user, ..init(blik_run_init) };
+            let run = blik_run { progress: Some(stop), progress_user: user, ..blik_run::default() };
             let status = blik_coupling_create(scene, &settings, &run, &mut error, &mut coupling);
             assert_eq!((status, calls.0), (BLIK_ERROR_CANCELLED, 3));
             assert!(coupling.is_null());

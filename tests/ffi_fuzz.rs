@@ -7,19 +7,8 @@ mod faults;
 
 use blik::*;
 use std::ffi::c_void;
-use std::mem::MaybeUninit;
 use std::ptr::{null, null_mut};
 use std::time::{Duration, Instant};
-
-/// A struct with the defaults that its init function sets.
-fn init<T>(init: unsafe extern "C" fn(*mut T)) -> T {
-    let mut value = MaybeUninit::uninit();
-    // SAFETY: the init function writes a whole value.
-    unsafe {
-        init(value.as_mut_ptr());
-        value.assume_init()
-    }
-}
 
 /// Memory on the boundary of blocks.
 #[derive(Clone)]
@@ -190,14 +179,14 @@ fn refused(status: i32) -> bool {
 
 /// The light of `inputs`, handed to `with`.
 fn with_light<R>(inputs: &Inputs, with: impl FnOnce(&blik_light) -> R) -> R {
-    let mut sky = init(blik_sky_init);
+    let mut sky = blik_sky::default();
     (sky.model, sky.radiance, sky.up) = (inputs.model, inputs.radiance.as_ptr(), inputs.up);
     sky.sun_direction = inputs.sun;
     let samples = [1.0f32; 8];
     (sky.table, sky.table_rows, sky.table_columns) = (samples.as_ptr(), 2, 4);
-    let mut sun = init(blik_sun_init);
+    let mut sun = blik_sun::default();
     (sun.direction, sun.half_angle_deg) = (inputs.sun, inputs.half_angle);
-    with(&blik_light { sky: &sky, sun: &sun, ..init(blik_light_init) })
+    with(&blik_light { sky: &sky, sun: &sun, ..blik_light::default() })
 }
 
 /// The mesh of `inputs`, handed to `with`.
@@ -211,7 +200,7 @@ fn with_mesh<R>(inputs: &Inputs, with: impl FnOnce(&blik_mesh) -> R) -> R {
         gloss_rays: inputs.gloss_rays,
     };
     let materials = [material(d0, s0, e0, inputs.gloss[0]), material(d1, s1, e1, inputs.gloss[1])];
-    let mut mesh = init(blik_mesh_init);
+    let mut mesh = blik_mesh::default();
     (mesh.vertices.data, mesh.vertices.count) = (inputs.vertices.as_ptr().cast(), inputs.vertices.len());
     (mesh.facets.data, mesh.facets.count) = (inputs.facets.as_ptr().cast(), inputs.facets.len());
     mesh.facet_materials.data = inputs.facet_materials.as_ptr().cast();
@@ -223,7 +212,7 @@ fn with_mesh<R>(inputs: &Inputs, with: impl FnOnce(&blik_mesh) -> R) -> R {
 
 /// From the inputs to a solution, as far as it goes.
 fn prepare(inputs: &Inputs) -> Option<Handles> {
-    let mut settings = init(blik_settings_init);
+    let mut settings = blik_settings::default();
     (settings.tolerance, settings.max_bounces) = (inputs.tolerance, inputs.max_bounces);
     let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
     // SAFETY: arrays as long as stated; what their numbers are is what is tested.
@@ -247,7 +236,7 @@ const PIXELS: usize = 6;
 
 /// The pixels that a camera sees, finite all.
 fn image(solution: *const blik_solution, inputs: &Inputs) -> Option<Vec<u32>> {
-    let mut camera = init(blik_camera_init);
+    let mut camera = blik_camera::default();
     let [a, b, c, d, e, f, g, h, i, size] = inputs.camera;
     (camera.eye, camera.target, camera.up) = ([a, b, c], [d, e, f], [g, h, i]);
     (camera.height, camera.fov_deg) = (size, size);
@@ -257,7 +246,8 @@ fn image(solution: *const blik_solution, inputs: &Inputs) -> Option<Vec<u32>> {
     let (out, count) = (pixels.as_mut_ptr(), pixels.len());
     // SAFETY: arrays as long as stated.
     let status = unsafe {
-        blik_image(solution, &camera, null(), null_mut(), 0, null_mut(), out, count, null_mut(), null_mut())
+        let none = null_mut();
+        blik_image(solution, &camera, null(), none, 0, null_mut(), out, count, null_mut(), 0, null_mut())
     };
     if refused(status) {
         return None;
@@ -285,7 +275,8 @@ fn loaded<R>(
     size: usize,
     with: impl FnOnce(*const blik_scene, *const blik_coupling, *const blik_solution) -> R,
 ) -> Result<R, i32> {
-    let (mut scene, mut coupling, mut solution, mut bytes) = (null(), null(), null(), 0);
+    let (mut scene, mut coupling, mut solution) = (null_mut(), null_mut(), null_mut());
+    let mut bytes = 0;
     let at = block.at().cast::<c_void>();
     // SAFETY: the block has so many bytes, and outlives the handles.
     unsafe {
@@ -333,7 +324,7 @@ fn a_loaded_block_shows_and_relights_the_same_bits() {
         let shown = loaded(&mut moved, size, |scene, coupling, solution| {
             // SAFETY: all are numbers; loaded handles.
             let info = unsafe {
-                let mut info: blik_scene_info = std::mem::zeroed();
+                let mut info = blik_scene_info::default();
                 assert_eq!(blik_scene_get_info(scene, null_mut(), &mut info), BLIK_OK);
                 info
             };
@@ -435,4 +426,55 @@ fn odd_numbers_are_refused_or_shown_finite() {
     }
     println!("{shown} of {tries} inputs shown");
     assert!(shown > 20, "{shown} of {tries}");
+}
+
+/// Whatever the numbers of a ray, all who take rays agree on whether it is one, and answer with numbers.
+#[test]
+fn odd_rays_are_refused_or_answered() {
+    let inputs = Inputs { gloss: [0.0, 9.0], ..Inputs::new() };
+    let made = prepare(&inputs).unwrap();
+    let (end, mut random, mut tries, mut answered) = (until(), Random(3), 0, 0);
+    while tries < 20_000 || Instant::now() < end {
+        tries += 1;
+        let angle = random.number();
+        let mut ray = blik_ray { origin: [0.4, 0.3, 2.0], ..blik_ray::default() };
+        if angle.abs() < 1.0 {
+            ray.direction = [angle, 0.0, -(1.0 - angle * angle).sqrt()];
+        }
+        for _ in 0..random.below(3) {
+            let x = random.number();
+            match random.below(4) {
+                0 => ray.origin[random.below(3)] = x,
+                1 => ray.direction[random.below(3)] = x,
+                2 => ray.t_max = x,
+                _ => ray.skip = [0, 4, 5, 6, u32::MAX, 1 << 31][random.below(6)],
+            }
+        }
+        let (mut radiance, mut any) = ([f64::NAN; 2], [9u8]);
+        let mut hit = blik_hit { t: f64::NAN, u: f64::NAN, v: f64::NAN, facet: 77, front: 9 };
+        let mut error = blik_error::default();
+        // SAFETY: live handles, arrays as long as stated.
+        let statuses = unsafe {
+            [
+                blik_radiance(made.solution, &ray, 1, null(), null_mut(), 0, &mut error, &mut radiance[0], 2),
+                blik_closest_hits(made.scene, &ray, 1, null(), &mut error, &mut hit, 1),
+                blik_any_hits(made.scene, &ray, 1, null(), &mut error, &mut any[0], 1),
+            ]
+        };
+        assert!(statuses.iter().all(|status| *status == statuses[0]), "{ray:?}: {statuses:?}");
+        if refused(statuses[0]) {
+            assert!(
+                (BLIK_FIELD_RAY_ORIGIN..=BLIK_FIELD_RAY_SKIP).contains(&error.field),
+                "{ray:?}: {error:?}"
+            );
+            assert!(radiance.iter().all(|l| l.is_nan()) && hit.facet == 77 && any == [9], "{ray:?}");
+            continue;
+        }
+        answered += 1;
+        assert!(radiance.iter().all(|l| l.is_finite() && *l >= 0.0), "{ray:?}: {radiance:?}");
+        assert!(hit.t >= 0.0 && hit.u.is_finite() && hit.v.is_finite(), "{ray:?}: {hit:?}");
+        assert_eq!(any[0] == 1, hit.facet != BLIK_NO_FACET, "{ray:?}: {hit:?}");
+    }
+    println!("{answered} of {tries} rays answered");
+    assert!(answered > tries / 10 && answered < tries, "{answered} of {tries}");
 }

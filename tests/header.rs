@@ -1,8 +1,12 @@
-//! `include/blik.h` is what cbindgen makes of `ffi/src`, carries the manifest's version, and compiles alone as C
-//! and C++ without a warning.
+//! `include/*.h` are what cbindgen and `ffi/header` make of `ffi/src`, carry the manifest's version, and compile alone as
+//! C and C++ without a warning.
 //!
-//! After a change of the interface: `UPDATE_HEADER=1 cargo test --test header` writes the file anew.
+//! After a change of the interface: `UPDATE_HEADER=1 cargo test --test header` writes the files anew.
 
+#[path = "support/header.rs"]
+mod generator;
+
+use generator::{HEADERS, generated};
 use std::io::ErrorKind;
 use std::path::Path;
 use std::process::Command;
@@ -12,55 +16,42 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The checked-in header, written anew first where that is asked for: once, whichever test comes first.
-fn kept() -> &'static str {
-    static KEPT: OnceLock<String> = OnceLock::new();
+/// The checked-in headers, written anew first where that is asked for: once, whichever test comes first.
+fn kept() -> &'static [String] {
+    static KEPT: OnceLock<Vec<String>> = OnceLock::new();
     KEPT.get_or_init(|| {
-        let path = root().join("include/blik.h");
         if std::env::var_os("UPDATE_HEADER").is_some() {
-            std::fs::write(&path, generated()).unwrap();
+            for (name, text) in generated(root()) {
+                std::fs::write(root().join("include").join(name), text).unwrap();
+            }
         }
-        std::fs::read_to_string(&path).unwrap()
+        HEADERS.map(|name| std::fs::read_to_string(root().join("include").join(name)).unwrap()).to_vec()
     })
 }
 
-/// The header as cbindgen makes it now.
-fn generated() -> String {
-    let ffi = root().join("ffi");
-    let config = cbindgen::Config::from_file(ffi.join("cbindgen.toml")).unwrap();
-    let bindings =
-        cbindgen::Builder::new().with_config(config).with_src(ffi.join("src/lib.rs")).generate().unwrap();
-    let mut text = Vec::new();
-    bindings.write(&mut text);
-    for_c(&String::from_utf8(text).unwrap())
-}
-
-/// The comments without what only Rust's documentation needs: paragraphs on safety and the brackets of links.
-fn for_c(text: &str) -> String {
-    let (mut out, mut skipping) = (String::new(), false);
-    for line in text.lines() {
-        let comment = line.trim();
-        skipping = (skipping || comment == "* # Safety") && comment != "*/";
-        if !skipping {
-            out += &line.replace("[`", "").replace("`]", "");
-            out.push('\n');
-        }
-    }
-    // the blank line before the paragraph that was cut
-    out.replace(" *\n */", " */")
-}
-
 #[test]
-fn the_header_is_in_step_with_its_source() {
-    assert!(
-        kept() == generated(),
-        "include/blik.h is not what ffi/src says: run `UPDATE_HEADER=1 cargo test --test header`"
-    );
+fn the_headers_are_in_step_with_their_source() {
+    for ((name, text), kept) in generated(root()).iter().zip(kept()) {
+        assert!(
+            kept == text,
+            "include/{name} is not what ffi/src says: run `UPDATE_HEADER=1 cargo test --test header`"
+        );
+    }
+}
+
+/// A reader of blik.h comes to its first function soon, and to its end.
+#[test]
+fn the_header_is_a_manual_of_bounded_length() {
+    let text = &kept()[0];
+    let overview = text.lines().position(|line| line.trim() == "*/").unwrap();
+    let first = text.lines().position(|line| line.starts_with("BLIK_API")).unwrap();
+    assert!(text.lines().count() <= 1300, "{} lines", text.lines().count());
+    assert!(first - overview <= 300, "the first function stands in line {first}");
 }
 
 #[test]
 fn header_library_and_manifest_have_one_version() {
-    let text = kept();
+    let text = &kept()[0];
     let define = |name: &str| {
         let start = format!("#define {name} ");
         let line =
@@ -111,11 +102,11 @@ fn compiles(compiler: &str, standard: &str, header: &str) -> bool {
     true
 }
 
-/// Compiles a header by all compilers there are, as each of the standards; some must be there.
-fn compiles_as(compilers: &[&str], standards: &[&str], header: &str) -> usize {
+/// Compiles the headers by all compilers there are, as each of the standards; some must be there.
+fn compiles_as(compilers: &[&str], standards: &[&str]) -> usize {
     let pairs = compilers.iter().flat_map(|c| standards.iter().map(move |s| (c, s)));
     let done = pairs.filter(|(compiler, standard)| {
-        let done = compiles(compiler, standard, header);
+        let done = HEADERS.iter().all(|header| compiles(compiler, standard, header));
         if !done {
             eprintln!("no {compiler} -std={standard}: not checked");
         }
@@ -125,13 +116,13 @@ fn compiles_as(compilers: &[&str], standards: &[&str], header: &str) -> usize {
 }
 
 #[test]
-fn the_header_alone_is_c99_to_c23() {
-    let done = compiles_as(&["cc", "gcc", "clang"], &["c99", "c11", "c17", "c2x"], "blik.h");
+fn each_header_alone_is_c99_to_c23() {
+    let done = compiles_as(&["cc", "gcc", "clang"], &["c99", "c11", "c17", "c2x"]);
     // Rust links with a C compiler: one is there
     assert!(done >= 3, "no C compiler");
 }
 
 #[test]
-fn the_header_alone_is_cpp11_to_cpp23() {
-    compiles_as(&["c++", "g++", "clang++"], &["c++11", "c++14", "c++17", "c++20", "c++2b"], "blik.h");
+fn each_header_alone_is_cpp11_to_cpp23() {
+    compiles_as(&["c++", "g++", "clang++"], &["c++11", "c++14", "c++17", "c++20", "c++2b"]);
 }

@@ -11,16 +11,6 @@ use std::ptr::{null, null_mut};
 pub const PAIRS: [(&str, &str); 4] =
     [("c_geometry", "geometry"), ("c_light", "light"), ("c_image", "image"), ("c_signature", "signature")];
 
-/// A struct with the defaults that its init function sets.
-fn init<T>(init: unsafe extern "C" fn(*mut T)) -> T {
-    let mut value = MaybeUninit::uninit();
-    // SAFETY: the init function writes a whole value.
-    unsafe {
-        init(value.as_mut_ptr());
-        value.assume_init()
-    }
-}
-
 /// Asks for a size.
 fn size(of: impl FnOnce(*mut usize) -> i32) -> Vec<u8> {
     let mut bytes = 0;
@@ -49,7 +39,7 @@ pub fn run(case: &Case, pixels: usize, step: fn()) {
         };
         let materials: Vec<blik_material> = input.materials.iter().map(material).collect();
         let array = |data, count, format| blik_array { data, count, stride: 0, format };
-        let mut mesh: blik_mesh = init(blik_mesh_init);
+        let mut mesh: blik_mesh = blik_mesh::default();
         mesh.vertices = array(input.vertices.as_ptr().cast(), input.vertices.len(), BLIK_F64);
         mesh.facets = array(input.facets.as_ptr().cast(), input.facets.len(), BLIK_U32);
         mesh.facet_materials =
@@ -58,15 +48,15 @@ pub fn run(case: &Case, pixels: usize, step: fn()) {
             (materials.as_ptr(), materials.len(), input.bands);
         // SAFETY: all arrays outlive the calls, and memory is as large as asked.
         memory.scene = size(|bytes| unsafe { blik_scene_size(&mesh, null_mut(), bytes) });
-        let settings = blik_settings { tolerance: case.settings.tolerance, ..init(blik_settings_init) };
+        let settings = blik_settings { tolerance: case.settings.tolerance, ..blik_settings::default() };
         step();
         let coupling = counted_c_geometry(&mesh, &settings, &mut memory);
         let ground = vec![0.1; input.bands];
-        let sky = blik_sky { model: BLIK_SKY_OVERCAST, ground: ground.as_ptr(), ..init(blik_sky_init) };
+        let sky = blik_sky { model: BLIK_SKY_OVERCAST, ground: ground.as_ptr(), ..blik_sky::default() };
         let irradiance = vec![2.0; input.bands];
         let sun =
-            blik_sun { direction: [0.3, 0.2, 1.0], irradiance: irradiance.as_ptr(), ..init(blik_sun_init) };
-        let light = blik_light { sky: &sky, sun: &sun, ..init(blik_light_init) };
+            blik_sun { direction: [0.3, 0.2, 1.0], irradiance: irradiance.as_ptr(), ..blik_sun::default() };
+        let light = blik_light { sky: &sky, sun: &sun, ..blik_light::default() };
         // SAFETY: as above.
         memory.solution = size(|bytes| unsafe { blik_solution_size(coupling, &light, null_mut(), bytes) });
         step();
@@ -84,7 +74,7 @@ fn counted_c_geometry(
     settings: &blik_settings,
     memory: &mut Memory,
 ) -> *const blik_coupling {
-    let (mut scene, mut coupling) = (null(), null());
+    let (mut scene, mut coupling) = (null_mut(), null_mut());
     let (own, rows) = (&mut memory.scene, &mut memory.coupling);
     // SAFETY: memory outlives the handles.
     unsafe {
@@ -104,7 +94,7 @@ fn counted_c_light(
     light: &blik_light,
     memory: &mut [u8],
 ) -> *const blik_solution {
-    let mut solution = null();
+    let mut solution = null_mut();
     let place = memory.as_mut_ptr().cast();
     // SAFETY: memory outlives the handle.
     let status = unsafe {
@@ -116,7 +106,7 @@ fn counted_c_light(
 
 #[inline(never)]
 fn counted_c_image(solution: *const blik_solution, pixels: usize) {
-    let mut view: blik_camera = init(blik_camera_init);
+    let mut view: blik_camera = blik_camera::default();
     let input = camera(EYE, 2.6, pixels);
     (view.eye, view.target, view.up, view.height) = (input.eye, input.target, input.up, 2.6);
     (view.columns, view.rows) = (pixels, pixels);
@@ -127,11 +117,22 @@ fn counted_c_image(solution: *const blik_solution, pixels: usize) {
         let (place, bytes) = (scratch.as_mut_ptr().cast(), scratch.len());
         let (count, to) = (image.len(), image.as_mut_ptr());
         let mut tally = blik_tally::default();
-        let mut report = MaybeUninit::uninit();
-        let status =
-            blik_image(solution, &view, null(), place, bytes, null_mut(), to, count, null_mut(), &mut tally);
+        let mut report = blik_report::default();
+        let status = blik_image(
+            solution,
+            &view,
+            null(),
+            place,
+            bytes,
+            null_mut(),
+            to,
+            count,
+            null_mut(),
+            0,
+            &mut tally,
+        );
         assert_eq!(status, BLIK_OK);
-        assert_eq!(blik_get_report(solution, &tally, null_mut(), report.as_mut_ptr()), BLIK_OK);
+        assert_eq!(blik_get_report(solution, &tally, null_mut(), &mut report), BLIK_OK);
     }
     black_box(image);
 }
@@ -143,7 +144,19 @@ fn counted_c_signature(solution: *const blik_solution) {
     // SAFETY: a live handle; one direction and one band.
     let status = unsafe {
         let (at, to) = (direction.as_ptr(), signature.as_mut_ptr());
-        blik_signatures(solution, at, 1, 0, null(), null_mut(), 0, null_mut(), to)
+        blik_signatures(
+            solution,
+            at,
+            1,
+            0,
+            null(),
+            null_mut(),
+            0,
+            null_mut(),
+            to,
+            1,
+            size_of::<blik_signature>(),
+        )
     };
     assert_eq!(status, BLIK_OK);
     // SAFETY: written.

@@ -61,7 +61,7 @@ int main(int count, char **arguments) try {
     const blik::scene scene(mesh);
     const blik::coupling coupling(scene, blik::settings(tolerance), blik::threads());
     const blik::solution solution(coupling, blik::light(blik::sky()), blik::threads());
-    const std::size_t facets = scene.info().facets, total = solution.report(blik_tally{}).bytes;
+    const std::size_t facets = scene.info().facets, total = solution.report(blik::tally()).bytes;
     const std::size_t kept = scene.info().bytes + coupling.info().bytes;
     std::printf("%zu facets at %g, bytes a facet: scene %zu, coupling %zu, solution %zu, baked block %zu\n", facets,
                 tolerance, scene.info().bytes / facets, coupling.info().bytes / facets, (total - kept) / facets,

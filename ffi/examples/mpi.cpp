@@ -52,11 +52,11 @@ void work(int rank, int ranks) {
     // row by row in turn, so that every rank gets its share of what is dear
     const blik_camera camera = blik::orthographic({4, -6, 5}, {0, 0, 0}, 5, columns, rows);
     std::vector<float> pixels(columns * rows, 0.0F), all(pixels.size());
-    blik_tally tally{};
+    blik_tally tally = blik::tally();
     for (int row = rank; row < rows; row += ranks) {
         const blik::image part = loaded.solution()->image_rows(camera, static_cast<std::size_t>(row), 1);
         std::copy(part.pixels.begin(), part.pixels.end(), pixels.begin() + row * columns);
-        blik_tally_add(&tally, &part.tally);
+        blik::add(tally, part.tally);
     }
     // every pixel is one rank's; the others' are 0
     MPI_Reduce(pixels.data(), all.data(), columns * rows, MPI_FLOAT, MPI_SUM, 0, MPI_COMM_WORLD);

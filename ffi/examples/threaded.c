@@ -12,11 +12,12 @@
 
 enum { COLUMNS = 320, ROWS = 240 };
 
-static void require(int32_t status, const blik_error *error)
+static void require(blik_status status, const blik_error *error)
 {
     if (status != BLIK_OK) {
-        fprintf(stderr, "%s (%s, index %lu)\n", blik_status_text(status), blik_field_text(error->field),
-                (unsigned long)error->index);
+        char text[256];
+        blik_error_text(error, text, sizeof text);
+        fprintf(stderr, "%s\n", text);
         exit(1);
     }
 }
@@ -99,9 +100,11 @@ int main(int count, char **arguments)
     camera.height = 5;
     camera.columns = COLUMNS;
     camera.rows = ROWS;
+    blik_tally_init(&tally);
+    blik_report_init(&report);
     run.progress = progress;
     run.progress_user = image_text;
-    require(blik_image(solution, &camera, &run, NULL, 0, &error, pixels, ROWS * COLUMNS, NULL, &tally), &error);
+    require(blik_image(solution, &camera, &run, NULL, 0, &error, pixels, ROWS * COLUMNS, NULL, 0, &tally), &error);
     require(blik_get_report(solution, &tally, &error, &report), &error);
     fprintf(stderr, "\n");
 

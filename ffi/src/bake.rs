@@ -11,7 +11,7 @@ use blik_kernel::bake::{self, Baked};
 use blik_kernel::coupling::Block;
 use blik_kernel::simd::Isa;
 use core::ffi::c_void;
-use core::ptr::null;
+use core::ptr::null_mut;
 
 /// Boundary, in bytes, on which a baked block starts.
 pub const BLIK_BLOCK_ALIGNMENT: usize = 64;
@@ -38,6 +38,10 @@ fn baked(
 
 /// Bytes of the block that [`blik_bake`] writes.
 ///
+/// - `coupling`: the coupling
+/// - `solution`: a solution of it; null: none
+/// - `bytes`: receives the bytes
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -46,7 +50,7 @@ pub unsafe extern "C" fn blik_bake_size(
     solution: *const blik_solution,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -67,8 +71,13 @@ unsafe fn optional<'a, T: Handle>(at: *const T) -> Result<Option<&'a T>, blik_er
     if at.is_null() { Ok(None) } else { unsafe { object(at) }.map(Some) }
 }
 
-/// Writes scene, tree, coupling and, where it is not null, a solution of this coupling as one relocatable block, with
-/// version, byte order, size and checksum, to `block`, which starts on a boundary of `BLIK_BLOCK_ALIGNMENT`.
+/// Writes scene, tree, coupling and perhaps a solution as one relocatable block, with version, byte order, size and
+/// checksum.
+///
+/// - `coupling`: the coupling
+/// - `solution`: a solution of it; null: none
+/// - `block`: receives the block; starts on a boundary of `BLIK_BLOCK_ALIGNMENT` bytes
+/// - `size`: bytes that there is room for
 ///
 /// # Safety
 /// Pointers are null or valid; `block` has `size` bytes.
@@ -79,7 +88,7 @@ pub unsafe extern "C" fn blik_bake(
     block: *mut c_void,
     size: usize,
     error: *mut blik_error,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (baked, memory) =
@@ -105,7 +114,11 @@ fn load_bytes(blocks: usize) -> usize {
 }
 
 /// Bytes of memory that [`blik_load`] needs for the handles of a block: some hundred, and some for each part of the
-/// coupling. Only the block's head is read.
+/// coupling.
+///
+/// - `block`: the block, of which the head alone is read
+/// - `size`: its bytes
+/// - `bytes`: receives the bytes
 ///
 /// # Safety
 /// Pointers are null or valid; `block` has `size` bytes.
@@ -115,7 +128,7 @@ pub unsafe extern "C" fn blik_load_size(
     size: usize,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -133,9 +146,16 @@ fn there(block: *const c_void) -> Result<*const u8, blik_error> {
     if block.is_null() { Err(blik_error::of(BLIK_ERROR_NULL)) } else { Ok(block.cast()) }
 }
 
-/// Checks the block in `block` from end to end and makes handles over it, in `memory`; the block itself is read where
-/// it stands (read-only memory will do) for as long as the handles are in use. `*solution` becomes null where the block
-/// has none. A block that is damaged or hostile is refused by `BLIK_ERROR_BLOCK`.
+/// Checks a block from end to end and makes handles over it. A block that is damaged or hostile is refused by
+/// `BLIK_ERROR_BLOCK`.
+///
+/// - `block`: the block; read where it stands (read-only memory will do) for as long as the handles are in use
+/// - `size`: its bytes
+/// - `memory`: memory for the handles, at any address
+/// - `memory_size`: its bytes
+/// - `scene`: receives the scene
+/// - `coupling`: receives the coupling
+/// - `solution`: receives the solution; null where the block has none
 ///
 /// # Safety
 /// Pointers are null or valid; `block` has `size` bytes, `memory` has `memory_size`.
@@ -146,10 +166,10 @@ pub unsafe extern "C" fn blik_load(
     memory: *mut c_void,
     memory_size: usize,
     error: *mut blik_error,
-    scene: *mut *const blik_scene,
-    coupling: *mut *const blik_coupling,
-    solution: *mut *const blik_solution,
-) -> i32 {
+    scene: *mut *mut blik_scene,
+    coupling: *mut *mut blik_coupling,
+    solution: *mut *mut blik_solution,
+) -> blik_status {
     call(error, || {
         let (to_scene, to_coupling, to_solution) = (needed(scene)?, needed(coupling)?, needed(solution)?);
         // SAFETY: by the caller's promise.
@@ -184,11 +204,11 @@ pub unsafe extern "C" fn blik_load(
             let base: &'static blik_scene = &*scene_at.as_ptr();
             coupling_at.write(blik_coupling::new(base, baked.elements, baked.blocks, settings));
             let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
-            let mut solved = null();
+            let mut solved = null_mut();
             if let Some((own, light)) = lit {
                 let (record, input) = (own.record, (own.sky, own.sun));
                 solution_at.write(blik_solution::new(coupled, light, input, record, record.memory()));
-                solved = solution_at.as_ptr().cast_const();
+                solved = solution_at.as_ptr();
             }
             to_scene.write(scene_at.as_ptr());
             to_coupling.write(coupling_at.as_ptr());

@@ -108,6 +108,8 @@ impl blik_coupling {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_coupling_info {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Elements that the facets are cut into.
     pub elements: usize,
     /// Sides of elements: rows of the coupling.
@@ -126,6 +128,23 @@ pub struct blik_coupling_info {
     /// free again.
     pub bytes: usize,
 }
+
+impl Default for blik_coupling_info {
+    fn default() -> blik_coupling_info {
+        blik_coupling_info {
+            struct_size: size_of::<blik_coupling_info>(),
+            elements: 0,
+            unknowns: 0,
+            pairs: 0,
+            skipped_rows: 0,
+            open_rows: 0,
+            rays: 0,
+            dropped: 0.0,
+            bytes: 0,
+        }
+    }
+}
+sized!(blik_coupling_info);
 
 /// Cuts a block of `size` bytes, of alignment 64, off the front of what is left.
 struct Cutter {
@@ -278,8 +297,18 @@ fn build(
     Ok(place.as_ptr())
 }
 
-/// Bytes of memory with which [`blik_coupling_init`] can begin. The rows' own part is not known before: where it does
-/// not fit, the call returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
+/// Bytes of memory with which [`blik_coupling_init`] can begin. What the rows take is not known before they are computed:
+///
+///     for (;;) {
+///         memory = realloc(memory, bytes);
+///         status = blik_coupling_init(scene, &settings, NULL, memory, bytes, &error, &coupling);
+///         if (status != BLIK_ERROR_BUFFER_TOO_SMALL) break;
+///         bytes = error.needed;
+///     }
+///
+/// - `scene`: the scene
+/// - `settings`: the settings
+/// - `bytes`: receives the bytes
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -289,7 +318,7 @@ pub unsafe extern "C" fn blik_coupling_size(
     settings: *const blik_settings,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -301,10 +330,12 @@ pub unsafe extern "C" fn blik_coupling_size(
     })
 }
 
-/// Computes the coupling of a scene in the caller's memory: once for a mesh and its materials, whatever the light.
+/// Computes the coupling of a scene in the caller's memory: once for a mesh and its materials, whatever the light. Where the
+/// memory does not suffice, `error->needed` is an extrapolation from the rows done.
 ///
-/// With `run` the rows are computed on the caller's threads, each in its part of the memory. The scene must outlive
-/// the coupling.
+/// - `scene`: the scene, which must outlive the coupling
+/// - `settings`: the settings
+/// - `coupling`: receives the coupling
 ///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the coupling is in use.
@@ -316,8 +347,8 @@ pub unsafe extern "C" fn blik_coupling_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    coupling: *mut *const blik_coupling,
-) -> i32 {
+    coupling: *mut *mut blik_coupling,
+) -> blik_status {
     call(error, || {
         let to = needed(coupling)?;
         // SAFETY: by the caller's promise.
@@ -330,8 +361,11 @@ pub unsafe extern "C" fn blik_coupling_init(
     })
 }
 
-/// Computes the coupling of a scene in memory of its own; to be ended by [`blik_coupling_destroy`]. The scene must
-/// outlive it.
+/// Computes the coupling of a scene in memory of its own.
+///
+/// - `scene`: the scene, which must outlive the coupling
+/// - `settings`: the settings
+/// - `coupling`: receives the coupling; to be ended by [`blik_coupling_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -343,7 +377,7 @@ pub unsafe extern "C" fn blik_coupling_create(
     run: *const blik_run,
     error: *mut blik_error,
     coupling: *mut *mut blik_coupling,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(coupling)?;
         // SAFETY: by the caller's promise.
@@ -356,7 +390,9 @@ pub unsafe extern "C" fn blik_coupling_create(
     })
 }
 
-/// Ends a coupling and frees what it owns; nothing for null. Solutions made from it must have ended before.
+/// Ends a coupling and frees what it owns.
+///
+/// - `coupling`: the coupling, whose solutions have ended before; null: nothing
 ///
 /// # Safety
 /// Null or a coupling that nobody uses.
@@ -371,6 +407,9 @@ pub unsafe extern "C" fn blik_coupling_destroy(coupling: *mut blik_coupling) {
 
 /// Numbers of a coupling; reads all of it.
 ///
+/// - `coupling`: the coupling
+/// - `info`: receives them; its `struct_size` is set before
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -378,14 +417,11 @@ pub unsafe extern "C" fn blik_coupling_get_info(
     coupling: *const blik_coupling,
     error: *mut blik_error,
     info: *mut blik_coupling_info,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(info)?;
         // SAFETY: by the caller's promise.
-        let coupling = unsafe { object(coupling) }?;
-        let info = coupling.info()?;
-        // SAFETY: not null.
-        unsafe { to.write(info) };
+        let (to, coupling) = unsafe { (Place::new(info)?, object(coupling)?) };
+        to.write(coupling.info()?);
         Ok(())
     })
 }
@@ -394,6 +430,7 @@ impl blik_coupling {
     pub(crate) fn info(&self) -> Result<blik_coupling_info, blik_error> {
         let matrix = self.matrix()?;
         let mut info = blik_coupling_info {
+            struct_size: size_of::<blik_coupling_info>(),
             elements: self.elements.count(),
             unknowns: self.elements.unknowns(),
             pairs: 0,

@@ -35,8 +35,14 @@ unsafe fn vector(at: *const f64) -> Result<Vec3, blik_error> {
     corners.first().copied().ok_or(blik_error::of(BLIK_ERROR_NULL))
 }
 
-/// Form factor from a point with a normal to a convex planar polygon, nothing in the way: the share that it fills of
-/// the point's cosine-weighted hemisphere. Corners are three numbers each, in order.
+/// Form factor from a point with a normal to a convex planar polygon, nothing in the way: the share that it fills of the
+/// point's cosine-weighted hemisphere.
+///
+/// - `point`: three numbers
+/// - `normal`: three numbers, of any length but zero
+/// - `polygon`: corners in order, three numbers each
+/// - `polygon_corners`: number of corners
+/// - `factor`: receives the form factor
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -48,7 +54,7 @@ pub unsafe extern "C" fn blik_form_factor_point(
     polygon_corners: usize,
     error: *mut blik_error,
     factor: *mut f64,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(factor)?;
         // SAFETY: by the caller's promise.
@@ -62,9 +68,15 @@ pub unsafe extern "C" fn blik_form_factor_point(
     })
 }
 
-/// Form factor from one convex planar polygon to another, nothing in the way, and their exchange area (area of the
-/// first times the factor; the same bits for both orders). Only the sides from which the corners run
-/// counter-clockwise see each other. `exchange_area` may be null.
+/// Form factor from one convex planar polygon to another, nothing in the way. Only the sides from which the corners run
+/// counter-clockwise see each other.
+///
+/// - `from`: corners in order, three numbers each
+/// - `from_corners`: number of corners
+/// - `polygon`: corners of the other
+/// - `polygon_corners`: number of corners
+/// - `factor`: receives the form factor
+/// - `exchange_area`: receives the area of the first times the factor, the same bits for both orders; null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -77,7 +89,7 @@ pub unsafe extern "C" fn blik_form_factor_polygon(
     error: *mut blik_error,
     factor: *mut f64,
     exchange_area: *mut f64,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(factor)?;
         // SAFETY: by the caller's promise.
@@ -93,15 +105,28 @@ pub unsafe extern "C" fn blik_form_factor_polygon(
     })
 }
 
-/// Bytes of scratch memory for [`blik_form_factor_visible`] with so many convex pieces of the visible part: each
-/// occluder cuts every piece that its outline crosses into at most four.
+/// Bytes of scratch memory for [`blik_form_factor_visible`].
+///
+/// - `pieces`: convex pieces that the visible part may fall into: each occluder cuts every piece that its outline crosses
+///   into at most four
 #[unsafe(no_mangle)]
 pub extern "C" fn blik_form_factor_scratch_size(pieces: usize) -> usize {
     pieces.saturating_mul(size_of::<Convex>()).saturating_add(align_of::<Convex>())
 }
 
-/// Form factor from one convex planar polygon to what of another the opaque triangles `occluders` (nine numbers each)
-/// leave visible, to an absolute `tolerance` > 0, and its expected error. `error_estimate` may be null.
+/// Form factor from one convex planar polygon to what opaque triangles leave visible of another.
+///
+/// - `from`: corners in order, three numbers each
+/// - `from_corners`: number of corners
+/// - `polygon`: corners of the other
+/// - `polygon_corners`: number of corners
+/// - `occluders`: the triangles, nine numbers each
+/// - `occluder_count`: number of triangles
+/// - `tolerance`: wanted absolute error, above 0
+/// - `scratch`: memory of [`blik_form_factor_scratch_size`] bytes
+/// - `scratch_size`: its bytes
+/// - `factor`: receives the form factor
+/// - `error_estimate`: receives its expected error; null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -119,7 +144,7 @@ pub unsafe extern "C" fn blik_form_factor_visible(
     error: *mut blik_error,
     factor: *mut f64,
     error_estimate: *mut f64,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(factor)?;
         if !(tolerance > 0.0 && tolerance.is_finite()) {
@@ -159,9 +184,13 @@ pub unsafe extern "C" fn blik_form_factor_visible(
     })
 }
 
-/// The lobe of a glossy material with `gloss_axis_ratio`, for a specular reflectance of 1: what share of light from
-/// everywhere it mirrors toward a view whose angle with the normal has the cosine `cos_view` (`albedo`, at most 1), and
-/// its value in sr-1 at an angle of cosine `cos_off` from the mirror direction. Either output may be null.
+/// The lobe of a glossy material, for a specular reflectance of 1.
+///
+/// - `gloss_axis_ratio`: long over short axis of the lobe, 1 or more
+/// - `cos_view`: cosine of the angle between view and normal
+/// - `cos_off`: cosine of the angle from the mirror direction
+/// - `albedo`: receives the share of light from everywhere that it mirrors toward the view, at most 1; null: not wanted
+/// - `value`: receives its value in sr-1; null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -173,7 +202,7 @@ pub unsafe extern "C" fn blik_gloss(
     error: *mut blik_error,
     albedo: *mut f64,
     value: *mut f64,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let lobe = Lobe::new(gloss_axis_ratio)?;
         let range = blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_DIRECTION);

@@ -20,11 +20,11 @@ pub type blik_first_facets =
 pub type blik_any_facets =
     Option<unsafe extern "C" fn(user: *mut c_void, rays: *const blik_ray, count: usize, hits: *mut u8)>;
 
-/// A ray tracer of the caller's over the mesh of a scene. Set by [`blik_intersector_init`] first.
+/// A ray tracer of the caller's over the mesh of a scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_intersector {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Finds first facets; must not be null.
     pub first_facets: blik_first_facets,
@@ -35,44 +35,39 @@ pub struct blik_intersector {
 }
 sized!(blik_intersector);
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `intersector` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_intersector_init(intersector: *mut blik_intersector) {
-    let value = blik_intersector {
-        struct_size: size_of::<blik_intersector>(),
-        first_facets: None,
-        any_facets: None,
-        user: null_mut(),
-    };
-    if !intersector.is_null() && intersector.is_aligned() {
-        // SAFETY: by the caller's promise there is room for one.
-        unsafe { intersector.write(value) };
+impl Default for blik_intersector {
+    fn default() -> blik_intersector {
+        blik_intersector {
+            struct_size: size_of::<blik_intersector>(),
+            first_facets: None,
+            any_facets: None,
+            user: null_mut(),
+        }
     }
 }
 
-/// Has rays traced by the caller's tracer, or, with a null pointer, by the library again. To be called while nobody else
-/// uses the scene, which keeps a copy; its functions must not throw and are in use as long as the scene.
+/// Has rays traced by the caller's tracer instead of the library's tree.
 ///
 /// Facets alone are taken from the tracer; where on them rays arrive is computed anew, and where a ray does not meet the
-/// facet that was named, the library finds the right one. Images are the same bits where the tracer names the same facets.
+/// facet that was named, the tree finds the right one. Images are the same bits where the tracer names the same facets.
 /// Rays come up to 32 at once (8 without the standard library) where none depends on what another meets (the first rays of
 /// form factors, of elements and of pixels, and those from elements toward the sun), else one by one (chains by way of
 /// mirrors).
+///
+/// - `scene`: the scene, which nobody else uses meanwhile
+/// - `intersector`: the tracer, of which the scene keeps a copy; in use as long as the scene. Null: the tree again
 ///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn blik_scene_set_intersector(
-    scene: *const blik_scene,
+    scene: *mut blik_scene,
     intersector: *const blik_intersector,
     error: *mut blik_error,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let corners = unsafe { object(scene) }?.scene.corners();
+        let corners = unsafe { object(scene.cast_const()) }?.scene.corners();
         let tracer = match intersector.is_null() {
             true => None,
             // SAFETY: by the caller's promise.
@@ -81,7 +76,7 @@ pub unsafe extern "C" fn blik_scene_set_intersector(
         if tracer.is_some_and(|t| t.first_facets.is_none()) {
             return Err(blik_error::of(BLIK_ERROR_NULL));
         }
-        let at = scene.cast_mut();
+        let at = scene;
         // SAFETY: a handle, which nobody else uses now and which does not move as long as it is used.
         unsafe {
             (*at).tracer = tracer.map(|tracer| Caller { tracer, scene: (*at).scene });

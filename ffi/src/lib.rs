@@ -18,23 +18,23 @@ mod run;
 mod scene;
 mod solution;
 mod status;
+mod text;
 mod types;
 mod view;
 
 pub use bake::*;
 pub use coupling::*;
 pub use form_factor::*;
-pub use intersector::{
-    blik_any_facets, blik_first_facets, blik_intersector, blik_intersector_init, blik_scene_set_intersector,
-};
+pub use intersector::{blik_any_facets, blik_first_facets, blik_intersector, blik_scene_set_intersector};
 pub use plane::*;
 pub use report::*;
 #[cfg(feature = "std")]
 pub use run::blik_run_on_threads;
-pub use run::{blik_parallel, blik_progress, blik_run, blik_run_init, blik_task};
+pub use run::{blik_parallel, blik_progress, blik_run, blik_task};
 pub use scene::*;
 pub use solution::*;
 pub use status::*;
+pub use text::*;
 pub use types::*;
 pub use view::*;
 
@@ -54,8 +54,7 @@ pub const BLIK_VERSION_PATCH: u32 = 0;
 /// Version of the library that this header belongs to, as `major * 10000 + minor * 100 + patch`.
 pub const BLIK_VERSION: u32 = BLIK_VERSION_MAJOR * 10000 + BLIK_VERSION_MINOR * 100 + BLIK_VERSION_PATCH;
 
-/// Version of the library that is linked, as `major * 10000 + minor * 100 + patch`; `BLIK_VERSION` is that of
-/// the header. May be called by any number of threads at once.
+/// Version of the library that is linked, as `major * 10000 + minor * 100 + patch`; `BLIK_VERSION` is that of the header.
 #[unsafe(no_mangle)]
 pub extern "C" fn blik_version() -> u32 {
     BLIK_VERSION

@@ -88,6 +88,38 @@ pub(crate) unsafe fn output<'a, T>(at: *mut T, count: usize) -> Result<&'a mut [
     Ok(unsafe { from_raw_parts_mut(at, count) })
 }
 
+/// The caller's array to write, the field `field`, of `wanted` values: `count` is their number.
+///
+/// # Safety
+/// As for [`output`].
+pub(crate) unsafe fn output_of<'a, T>(
+    (at, count): (*mut T, usize),
+    wanted: usize,
+    field: i32,
+) -> Result<&'a mut [T], blik_error> {
+    if count != wanted {
+        return Err(blik_error::of(BLIK_ERROR_LENGTH).field(field).sizes(wanted, count));
+    }
+    // SAFETY: by the caller's promise.
+    unsafe { output(at, count) }.map_err(|error| error.field(field))
+}
+
+/// The same where a null pointer stands for an array that nobody wants: none of it.
+///
+/// # Safety
+/// As for [`output`].
+pub(crate) unsafe fn optional_output<'a, T>(
+    (at, count): (*mut T, usize),
+    wanted: usize,
+    field: i32,
+) -> Result<&'a mut [T], blik_error> {
+    if at.is_null() {
+        return Ok(&mut []);
+    }
+    // SAFETY: by the caller's promise.
+    unsafe { output_of((at, count), wanted, field) }
+}
+
 fn usable<T>(at: *const T, count: usize) -> Result<(), blik_error> {
     if at.is_null() {
         return Err(blik_error::of(BLIK_ERROR_NULL));

@@ -1,31 +1,37 @@
 //! How good a result is, and what was done for it.
 
 use crate::call;
-use crate::memory::{needed, object};
+use crate::memory::object;
 use crate::solution::blik_solution;
 use crate::status::*;
+use crate::types::{Place, Sized_, read, sized};
 use crate::view::blik_tally;
 use blik_kernel::policy::{self, Limit, Round};
 use blik_kernel::settings::Settings as Asked;
 
-/// `limited_by` of [`blik_report`]: the estimate is 0.
+/// The largest part of the estimate of a [`blik_report`].
+pub type blik_limit = i32;
+
+/// The estimate is 0.
 pub const BLIK_LIMIT_NOTHING: i32 = 0;
-/// `limited_by` of [`blik_report`]: rays and elements of the diffuse solution.
+/// Rays and elements of the diffuse solution.
 pub const BLIK_LIMIT_VISIBILITY: i32 = 1;
-/// `limited_by` of [`blik_report`]: rays through pixels.
+/// Rays through pixels.
 pub const BLIK_LIMIT_SAMPLING: i32 = 2;
-/// `limited_by` of [`blik_report`]: sweeps that were not done.
+/// Sweeps that were not done.
 pub const BLIK_LIMIT_SOLVER: i32 = 3;
-/// `limited_by` of [`blik_report`]: chains that were cut.
+/// Chains that were cut.
 pub const BLIK_LIMIT_CHAIN: i32 = 4;
 
 /// What comes back with an image.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_report {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// The wanted error, of the solution where images have one of their own.
     pub tolerance: f64,
-    /// Expected error of the image (eps of eq. 16), relative to the reference radiance.
+    /// Expected error of the image (rms over the pixels that meet the object), relative to the reference radiance.
     pub error_estimate: f64,
     /// Certain bound on the distance of the radiances from the solution of the discrete system.
     pub certified_solver: f64,
@@ -55,11 +61,81 @@ pub struct blik_report {
     pub sweeps: u32,
     /// 1 where the estimate is at most the wanted error of images.
     pub tolerance_met: i32,
-    /// The largest part of the estimate, `BLIK_LIMIT_*`.
-    pub limited_by: i32,
+    /// The largest part of the estimate.
+    pub limited_by: blik_limit,
 }
 
-/// The report of an image from the tally of all its rows; reads the whole coupling.
+impl Default for blik_report {
+    fn default() -> blik_report {
+        blik_report {
+            struct_size: size_of::<blik_report>(),
+            tolerance: 0.0,
+            error_estimate: 0.0,
+            certified_solver: 0.0,
+            certified_chain_tail: 0.0,
+            certified_dropped: 0.0,
+            visibility_rays: 0,
+            sun_rays: 0,
+            primary_rays: 0,
+            chain_rays: 0,
+            pairs: 0,
+            skipped_rows: 0,
+            open_rows: 0,
+            elements: 0,
+            bytes: 0,
+            sweeps: 0,
+            tolerance_met: 0,
+            limited_by: BLIK_LIMIT_NOTHING,
+        }
+    }
+}
+
+/// The rounds of an image: what was asked, and what the last round came to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_rounds {
+    /// Size of this struct.
+    pub struct_size: usize,
+    /// The wanted error of the image, 1e-6 to 0.1: `image_tolerance` of the settings of every round; default 2e-3.
+    pub asked: f64,
+    /// Tolerance of the coupling of the next round; set by [`blik_rounds_next`].
+    pub tolerance: f64,
+    /// Rounds so far; kept by [`blik_rounds_next`], as all that follows.
+    pub done: u32,
+    /// Not 0: the diffuse solution limited the last round.
+    pub last_by_visibility: i32,
+    /// Tolerance of the last round.
+    pub last_tolerance: f64,
+    /// Error estimate of the last round.
+    pub last_estimate: f64,
+    /// Rays of visibility of the last round.
+    pub last_rays: u64,
+    /// Bytes of the last round.
+    pub last_bytes: usize,
+}
+
+impl Default for blik_rounds {
+    fn default() -> blik_rounds {
+        blik_rounds {
+            struct_size: size_of::<blik_rounds>(),
+            asked: 2e-3,
+            tolerance: 0.0,
+            done: 0,
+            last_by_visibility: 0,
+            last_tolerance: 0.0,
+            last_estimate: 0.0,
+            last_rays: 0,
+            last_bytes: 0,
+        }
+    }
+}
+sized!(blik_report, blik_rounds);
+
+/// The report of an image; reads the whole coupling.
+///
+/// - `solution`: the solution
+/// - `tally`: the tally of all rows of the image
+/// - `report`: receives the report; its `struct_size` is set before
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -69,12 +145,11 @@ pub unsafe extern "C" fn blik_get_report(
     tally: *const blik_tally,
     error: *mut blik_error,
     report: *mut blik_report,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(report)?;
-        let tally = needed(tally.cast_mut())?;
         // SAFETY: by the caller's promise.
-        let (solution, tally): (&blik_solution, _) = unsafe { (object(solution)?, tally.read()) };
+        let (to, solution, tally): (_, &blik_solution, _) =
+            unsafe { (Place::new(report)?, object(solution)?, read(tally)?) };
         for value in [tally.noise_squared, tally.sampling_squared, tally.chain_tail] {
             if !(0.0..f64::INFINITY).contains(&value) {
                 return Err(blik_error::of(BLIK_ERROR_RANGE).field(BLIK_FIELD_TALLY).at(0, 0, value));
@@ -84,7 +159,8 @@ pub unsafe extern "C" fn blik_get_report(
         let (base, numbers) = (solution.coupling.base, &solution.record.numbers);
         let Asked { tolerance, image_tolerance, .. } = solution.coupling.settings.asked;
         let (estimate, limit) = policy::estimate(&tally.kernel(), numbers.solver);
-        let report = blik_report {
+        to.write(blik_report {
+            struct_size: size_of::<blik_report>(),
             tolerance,
             error_estimate: estimate,
             certified_solver: numbers.solver,
@@ -108,50 +184,62 @@ pub unsafe extern "C" fn blik_get_report(
                 Limit::Solver => BLIK_LIMIT_SOLVER,
                 Limit::Chain => BLIK_LIMIT_CHAIN,
             },
-        };
-        // SAFETY: not null.
-        unsafe { to.write(report) };
+        });
         Ok(())
     })
 }
 
-/// Whether an image had better be computed again, to a finer tolerance: `report` is that of the last round, which was
-/// number `rounds` (1 for the first), `before` that of the round before it, or null, and `asked` the wanted error. Writes the
-/// tolerance of the next round's coupling, or 0 where the image is good enough, would hardly be better, would take too
-/// much, or has had three rounds. With a null `report` it is the first round's: coarser than `asked` where that is little,
-/// since rays from the image's points find the rest; `image_tolerance` of the settings is `asked` in every round. This is
-/// what the program `render` and the Rust interface go by; an estimate of up to one and three quarters of the error asked
-/// for passes, after a round coarser than that up to 1.35.
+/// Whether an image had better be computed again, and to what tolerance: a loop that the program `render` and the Rust
+/// interface go by, too.
+///
+/// Writes to `tolerance` of the rounds that of the next round's coupling, or 0 where the image is good enough, would hardly
+/// be better, would take too much, or has had three rounds. The first round is coarser than `asked` where that is little,
+/// since rays from the image's points find the rest. An estimate of up to one and three quarters of the error asked for
+/// passes, after a round coarser than that up to 1.35.
+///
+/// - `rounds`: the rounds, set by `blik_rounds_init` and then by nothing but this call
+/// - `report`: the report of the image of the last round; null before the first
 ///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_next_tolerance(
+pub unsafe extern "C" fn blik_rounds_next(
+    rounds: *mut blik_rounds,
     report: *const blik_report,
-    before: *const blik_report,
-    asked: f64,
-    rounds: u32,
     error: *mut blik_error,
-    tolerance: *mut f64,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(tolerance)?;
-        policy::check_tolerance(asked)?;
-        let round = |report: &blik_report| Round {
+        // SAFETY: by the caller's promise.
+        let (to, mut rounds) = unsafe { (Place::new(rounds)?, read(rounds.cast_const())?) };
+        policy::check_tolerance(rounds.asked)?;
+        if report.is_null() {
+            let asked = rounds.asked;
+            to.write(blik_rounds { asked, tolerance: policy::first(asked), ..blik_rounds::default() });
+            return Ok(());
+        }
+        // SAFETY: by the caller's promise.
+        let report = unsafe { read(report) }?;
+        let last = Round {
             tolerance: report.tolerance,
             estimate: report.error_estimate,
             by_visibility: report.limited_by == BLIK_LIMIT_VISIBILITY,
             rays: report.visibility_rays,
             bytes: report.bytes,
         };
-        // SAFETY: null or valid by the caller's promise.
-        let (last, before) = unsafe { (report.as_ref().map(round), before.as_ref().map(round)) };
-        let next = match last {
-            None => policy::first(asked),
-            Some(last) => policy::again(asked, &last, before.as_ref(), rounds).unwrap_or(0.0),
+        let before = Round {
+            tolerance: rounds.last_tolerance,
+            estimate: rounds.last_estimate,
+            by_visibility: rounds.last_by_visibility != 0,
+            rays: rounds.last_rays,
+            bytes: rounds.last_bytes,
         };
-        // SAFETY: not null.
-        unsafe { to.write(next) };
+        let before = (rounds.done > 0).then_some(&before);
+        rounds.done = rounds.done.saturating_add(1);
+        rounds.tolerance = policy::again(rounds.asked, &last, before, rounds.done).unwrap_or(0.0);
+        rounds.last_by_visibility = i32::from(last.by_visibility);
+        (rounds.last_tolerance, rounds.last_estimate) = (last.tolerance, last.estimate);
+        (rounds.last_rays, rounds.last_bytes) = (last.rays, last.bytes);
+        to.write(rounds);
         Ok(())
     })
 }

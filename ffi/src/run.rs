@@ -13,20 +13,20 @@ use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 pub type blik_task = Option<unsafe extern "C" fn(context: *mut c_void, index: usize)>;
 
 /// Calls `task(context, i)` once for each i in 0 .. `count`, in any order, on any threads, and returns when all have
-/// returned.
+/// returned. It must not throw or jump out; where it returns without having called all, the stage is cancelled.
 pub type blik_parallel =
     Option<unsafe extern "C" fn(user: *mut c_void, count: usize, task: blik_task, context: *mut c_void)>;
 
 /// Told the share (0 to 1) of a stage that is done, never by two threads at once; not 0 asks the stage to stop, which
-/// then returns `BLIK_ERROR_CANCELLED`.
+/// then returns `BLIK_ERROR_CANCELLED`. It must not throw or jump out.
 pub type blik_progress = Option<unsafe extern "C" fn(user: *mut c_void, done: f64) -> i32>;
 
-/// How a long stage runs. Set by [`blik_run_init`] first; a null pointer to it stands for its defaults. The results
+/// How a long stage runs. A null pointer to it stands for its defaults. The results
 /// do not depend on it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_run {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Runs tasks on threads of the caller; null (default): the calling thread alone.
     pub parallel: blik_parallel,
@@ -41,26 +41,18 @@ pub struct blik_run {
 }
 sized!(blik_run);
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `run` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_run_init(run: *mut blik_run) {
-    if !run.is_null() && run.is_aligned() {
-        // SAFETY: by the caller's promise there is room for one.
-        unsafe { run.write(DEFAULT) };
+impl Default for blik_run {
+    fn default() -> blik_run {
+        blik_run {
+            struct_size: size_of::<blik_run>(),
+            parallel: None,
+            parallel_user: null_mut(),
+            lanes: 1,
+            progress: None,
+            progress_user: null_mut(),
+        }
     }
 }
-
-const DEFAULT: blik_run = blik_run {
-    struct_size: size_of::<blik_run>(),
-    parallel: None,
-    parallel_user: null_mut(),
-    lanes: 1,
-    progress: None,
-    progress_user: null_mut(),
-};
 
 /// The most lanes.
 pub(crate) const MOST_LANES: usize = 256;
@@ -117,7 +109,7 @@ impl Runner {
     /// As for [`read`]; the callbacks keep their promises.
     pub unsafe fn new(run: *const blik_run) -> Result<Runner, blik_error> {
         // SAFETY: by the caller's promise.
-        let run = if run.is_null() { DEFAULT } else { unsafe { read(run) }? };
+        let run = if run.is_null() { blik_run::default() } else { unsafe { read(run) }? };
         if !(1..=MOST_LANES).contains(&run.lanes) {
             let error = blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_LANES);
             return Err(error.sizes(MOST_LANES, run.lanes));
@@ -259,7 +251,12 @@ unsafe extern "C" fn lane(context: *mut c_void, index: usize) {
     unsafe { &*context.cast::<Job<'_>>() }.lane(index);
 }
 
-/// A [`blik_parallel`] that starts `count` threads for each stage and waits for them; `user` is not looked at.
+/// A [`blik_parallel`] that starts a thread for each task of a stage and waits for them.
+///
+/// - `user`: not looked at: there for the signature
+/// - `count`: number of tasks
+/// - `task`: the task
+/// - `context`: handed to the task
 ///
 /// # Safety
 /// `task` may be called with `context` on any thread.

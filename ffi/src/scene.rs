@@ -57,6 +57,8 @@ impl blik_scene {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_scene_info {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Facets, degenerate ones included.
     pub facets: usize,
     /// Facets of no area: they keep their index and take no part.
@@ -71,24 +73,46 @@ pub struct blik_scene_info {
     pub bytes: usize,
 }
 
-/// A ray for [`blik_closest_hits`] and [`blik_any_hits`], in the mesh's coordinates.
+impl Default for blik_scene_info {
+    fn default() -> blik_scene_info {
+        let struct_size = size_of::<blik_scene_info>();
+        blik_scene_info {
+            struct_size,
+            facets: 0,
+            degenerate_facets: 0,
+            materials: 0,
+            bands: 0,
+            sides: 0,
+            bytes: 0,
+        }
+    }
+}
+sized!(blik_scene_info);
+
+/// A ray in the mesh's coordinates. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_ray {
     /// Where it starts.
     pub origin: [f64; 3],
-    /// Unit vector along it.
+    /// Unit vector along it; default (0, 0, -1).
     pub direction: [f64; 3],
-    /// Hits at this distance and beyond do not count; infinity for no limit.
+    /// Hits at this distance and beyond do not count, 0 or more; default the largest number: no limit.
     pub t_max: f64,
-    /// Index of the facet that it leaves and never hits; `BLIK_NO_FACET` for none.
+    /// Index of the facet that it leaves and never hits; default `BLIK_NO_FACET`: none.
     pub skip: u32,
+}
+
+impl Default for blik_ray {
+    fn default() -> blik_ray {
+        blik_ray { origin: [0.0; 3], direction: [0.0, 0.0, -1.0], t_max: f64::MAX, skip: BLIK_NO_FACET }
+    }
 }
 
 /// "No facet" in [`blik_ray`] and [`blik_hit`].
 pub const BLIK_NO_FACET: u32 = 0xffff_ffff;
 
-/// Where a ray meets the mesh first.
+/// Where a ray meets the mesh first. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_hit {
@@ -128,7 +152,10 @@ fn build(mesh: &Reader, builder: Builder, memory: &'static mut [u8]) -> Result<*
     Ok(place.as_ptr())
 }
 
-/// Bytes of memory that [`blik_scene_init`] needs for this mesh, at any address.
+/// Bytes of memory that [`blik_scene_init`] needs for a mesh, at any address.
+///
+/// - `mesh`: the mesh
+/// - `bytes`: receives the bytes
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -137,7 +164,7 @@ pub unsafe extern "C" fn blik_scene_size(
     mesh: *const blik_mesh,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -149,8 +176,10 @@ pub unsafe extern "C" fn blik_scene_size(
     })
 }
 
-/// Checks a mesh and makes a scene of it in the caller's memory, where it lives until that is used for something
-/// else. The mesh is not needed afterwards.
+/// Checks a mesh and makes a scene of it in the caller's memory, where it lives until that is used for something else.
+///
+/// - `mesh`: the mesh; not needed afterwards
+/// - `scene`: receives the scene
 ///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the scene is in use.
@@ -160,8 +189,8 @@ pub unsafe extern "C" fn blik_scene_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    scene: *mut *const blik_scene,
-) -> i32 {
+    scene: *mut *mut blik_scene,
+) -> blik_status {
     call(error, || {
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
@@ -173,7 +202,10 @@ pub unsafe extern "C" fn blik_scene_init(
     })
 }
 
-/// Checks a mesh and makes a scene of it in memory of its own; to be ended by [`blik_scene_destroy`].
+/// Checks a mesh and makes a scene of it in memory of its own.
+///
+/// - `mesh`: the mesh; not needed afterwards
+/// - `scene`: receives the scene; to be ended by [`blik_scene_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -183,7 +215,7 @@ pub unsafe extern "C" fn blik_scene_create(
     mesh: *const blik_mesh,
     error: *mut blik_error,
     scene: *mut *mut blik_scene,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
@@ -200,7 +232,9 @@ pub unsafe extern "C" fn blik_scene_create(
     })
 }
 
-/// Ends a scene and frees what it owns; nothing for null. Couplings made from it must have ended before.
+/// Ends a scene and frees what it owns.
+///
+/// - `scene`: the scene, whose couplings have ended before; null: nothing
 ///
 /// # Safety
 /// Null or a scene that nobody uses.
@@ -215,6 +249,9 @@ pub unsafe extern "C" fn blik_scene_destroy(scene: *mut blik_scene) {
 
 /// Numbers of a scene.
 ///
+/// - `scene`: the scene
+/// - `info`: receives them; its `struct_size` is set before
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -222,21 +259,19 @@ pub unsafe extern "C" fn blik_scene_get_info(
     scene: *const blik_scene,
     error: *mut blik_error,
     info: *mut blik_scene_info,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(info)?;
         // SAFETY: by the caller's promise.
-        let blik_scene { scene, bvh, .. } = unsafe { object(scene) }?;
-        let info = blik_scene_info {
+        let (to, blik_scene { scene, bvh, .. }) = unsafe { (Place::new(info)?, object(scene)?) };
+        to.write(blik_scene_info {
             facets: scene.facets(),
             degenerate_facets: scene.degenerate(),
             materials: scene.materials(),
             bands: scene.bands(),
             sides: scene.sides(),
             bytes: scene.memory() + bvh.memory(),
-        };
-        // SAFETY: not null.
-        unsafe { to.write(info) };
+            ..blik_scene_info::default()
+        });
         Ok(())
     })
 }
@@ -244,8 +279,32 @@ pub unsafe extern "C" fn blik_scene_get_info(
 /// Stands where there is no ray.
 const NO_RAY: blik_ray = blik_ray { origin: [0.0; 3], direction: [0.0; 3], t_max: 0.0, skip: BLIK_NO_FACET };
 
+/// By how much the squared length of a unit vector may differ from 1: single precision's rounding many times over.
+const UNIT_SLACK: f64 = 1e-5;
+
+/// Refuses the first ray that is none.
+pub(crate) fn check(scene: &Scene<'_>, rays: &[blik_ray]) -> Result<(), blik_error> {
+    for (index, ray) in rays.iter().enumerate() {
+        let refused = |status, field, value| Err(blik_error::of(status).field(field).at(index, 0, value));
+        if let Some(&x) = ray.origin.iter().find(|x| !x.is_finite()) {
+            return refused(BLIK_ERROR_RANGE, BLIK_FIELD_RAY_ORIGIN, x);
+        }
+        let squared = Vec3::from_array(ray.direction).length_squared();
+        if !(1.0 - UNIT_SLACK..=1.0 + UNIT_SLACK).contains(&squared) {
+            return refused(BLIK_ERROR_DIRECTION, BLIK_FIELD_RAY_DIRECTION, squared);
+        }
+        if !(0.0..=f64::INFINITY).contains(&ray.t_max) {
+            return refused(BLIK_ERROR_RANGE, BLIK_FIELD_RAY_T_MAX, ray.t_max);
+        }
+        if ray.skip != BLIK_NO_FACET && ray.skip as usize >= scene.facets() {
+            return refused(BLIK_ERROR_RANGE, BLIK_FIELD_RAY_SKIP, f64::from(ray.skip));
+        }
+    }
+    Ok(())
+}
+
 /// The kernel's ray for a caller's: scene coordinates, in which distances are `scale` times as long.
-fn inside(scene: &Scene<'_>, ray: &blik_ray) -> Ray {
+pub(crate) fn inside(scene: &Scene<'_>, ray: &blik_ray) -> Ray {
     Ray {
         origin: scene.to_scene(Vec3::from_array(ray.origin)),
         direction: Vec3::from_array(ray.direction),
@@ -254,7 +313,13 @@ fn inside(scene: &Scene<'_>, ray: &blik_ray) -> Ray {
     }
 }
 
-/// The first facet that each ray meets: least distance, then lowest index, whatever the machine.
+/// The first facet that each ray meets: at the least distance; among equals a front before a back, then the lowest index.
+///
+/// - `scene`: the scene
+/// - `rays`: the rays; one that is not finite, of no unit direction or of no such `skip` is refused with its index
+/// - `count`: number of rays
+/// - `hits`: receives one hit a ray
+/// - `hit_count`: number of hits that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid; `rays` and `hits` have `count` entries.
@@ -266,11 +331,16 @@ pub unsafe extern "C" fn blik_closest_hits(
     run: *const blik_run,
     error: *mut blik_error,
     hits: *mut blik_hit,
-) -> i32 {
+    hit_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let (handle, rays, out, mut runner) =
-            unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
+        let (handle, rays, out, mut runner) = unsafe {
+            let handle: &blik_scene = object(scene)?;
+            let out = output_of((hits, hit_count), count, BLIK_FIELD_HITS)?;
+            (handle, input(rays, count)?, out, Runner::new(run)?)
+        };
+        check(&handle.scene, rays)?;
         runner.rows(out, 1, 1.0, |range, out| {
             let (mut ahead, own) = (AnswerBuffer::default(), rays.get(range).unwrap_or_default());
             let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));
@@ -292,7 +362,13 @@ pub unsafe extern "C" fn blik_closest_hits(
     })
 }
 
-/// Whether each ray meets any facet: 1 or 0.
+/// Whether each ray meets any facet.
+///
+/// - `scene`: the scene
+/// - `rays`: the rays, as for [`blik_closest_hits`]
+/// - `count`: number of rays
+/// - `hits`: receives 1 or 0 for each ray
+/// - `hit_count`: number of values that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid; `rays` and `hits` have `count` entries.
@@ -304,11 +380,16 @@ pub unsafe extern "C" fn blik_any_hits(
     run: *const blik_run,
     error: *mut blik_error,
     hits: *mut u8,
-) -> i32 {
+    hit_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let (handle, rays, out, mut runner) =
-            unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?, Runner::new(run)?) };
+        let (handle, rays, out, mut runner) = unsafe {
+            let handle: &blik_scene = object(scene)?;
+            let out = output_of((hits, hit_count), count, BLIK_FIELD_HITS)?;
+            (handle, input(rays, count)?, out, Runner::new(run)?)
+        };
+        check(&handle.scene, rays)?;
         runner.rows(out, 1, 1.0, |range, out| {
             let (mut ahead, own) = (AnswerBuffer::default(), rays.get(range).unwrap_or_default());
             let any = |n: u32| inside(&handle.scene, own.get(n as usize).unwrap_or(&NO_RAY));

@@ -262,9 +262,12 @@ fn build(
     Ok(place.as_ptr())
 }
 
-/// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with
-/// mirrors and a sun on several threads. Where mirrors scatter sunlight over many more elements than usual, the call
-/// returns `BLIK_ERROR_BUFFER_TOO_SMALL` and `error->needed` says how many bytes probably do.
+/// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with mirrors and a
+/// sun on several threads.
+///
+/// - `coupling`: the coupling
+/// - `light`: the light
+/// - `bytes`: receives the bytes
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -274,7 +277,7 @@ pub unsafe extern "C" fn blik_solution_size(
     light: *const blik_light,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -289,9 +292,14 @@ pub unsafe extern "C" fn blik_solution_size(
     })
 }
 
-/// Lights a scene and solves for its diffuse radiance, in the caller's memory. For another light call it again, with
-/// the same memory or other: the coupling is not computed anew, and no ray toward the sky is traced. The coupling must
-/// outlive the solution.
+/// Lights a scene and solves for its diffuse radiance, in the caller's memory. Another light is another call, in the same
+/// memory or other: the coupling is not computed anew, and no ray toward the sky is traced. Where mirrors scatter sunlight
+/// over many more elements than usual, the call returns `BLIK_ERROR_BUFFER_TOO_SMALL`, and `error->needed` says how many bytes
+/// probably do.
+///
+/// - `coupling`: the coupling, which must outlive the solution
+/// - `light`: the light; not needed afterwards
+/// - `solution`: receives the solution
 ///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the solution is in use.
@@ -303,8 +311,8 @@ pub unsafe extern "C" fn blik_solution_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    solution: *mut *const blik_solution,
-) -> i32 {
+    solution: *mut *mut blik_solution,
+) -> blik_status {
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
@@ -324,7 +332,11 @@ pub unsafe extern "C" fn blik_solution_init(
 #[cfg(feature = "std")]
 const MOST_BYTES: usize = if usize::BITS > 32 { 1 << 34 } else { 1 << 30 };
 
-/// As [`blik_solution_init`], in memory of its own; to be ended by [`blik_solution_destroy`].
+/// Lights a scene and solves for its diffuse radiance, in memory of its own.
+///
+/// - `coupling`: the coupling, which must outlive the solution
+/// - `light`: the light; not needed afterwards
+/// - `solution`: receives the solution; to be ended by [`blik_solution_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -336,7 +348,7 @@ pub unsafe extern "C" fn blik_solution_create(
     run: *const blik_run,
     error: *mut blik_error,
     solution: *mut *mut blik_solution,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
@@ -367,7 +379,9 @@ pub unsafe extern "C" fn blik_solution_create(
     })
 }
 
-/// Ends a solution and frees what it owns; nothing for null.
+/// Ends a solution and frees what it owns.
+///
+/// - `solution`: the solution; null: nothing
 ///
 /// # Safety
 /// Null or a solution that nobody uses.
@@ -380,7 +394,55 @@ pub unsafe extern "C" fn blik_solution_destroy(solution: *mut blik_solution) {
     });
 }
 
-/// Reference radiance of each band, to which tolerance and errors are related.
+/// Numbers of a solution.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct blik_solution_info {
+    /// Size of this struct.
+    pub struct_size: usize,
+    /// Facets of its scene, degenerate ones included.
+    pub facets: usize,
+    /// Sides of a facet that carry its material: 1 or 2.
+    pub sides: usize,
+    /// Spectral bands.
+    pub bands: usize,
+}
+
+impl Default for blik_solution_info {
+    fn default() -> blik_solution_info {
+        blik_solution_info { struct_size: size_of::<blik_solution_info>(), facets: 0, sides: 0, bands: 0 }
+    }
+}
+sized!(blik_solution_info);
+
+/// Numbers of a solution: what arrays of its results are as long as.
+///
+/// - `solution`: the solution
+/// - `info`: receives them; its `struct_size` is set before
+///
+/// # Safety
+/// Pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn blik_solution_get_info(
+    solution: *const blik_solution,
+    error: *mut blik_error,
+    info: *mut blik_solution_info,
+) -> blik_status {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (to, solution): (_, &blik_solution) = unsafe { (Place::new(info)?, object(solution)?) };
+        let scene = &solution.coupling.base.scene;
+        let (facets, sides, bands) = (scene.facets(), scene.sides(), scene.bands());
+        to.write(blik_solution_info { facets, sides, bands, ..blik_solution_info::default() });
+        Ok(())
+    })
+}
+
+/// Reference radiance, to which tolerance and errors are related.
+///
+/// - `solution`: the solution
+/// - `radiance`: receives one value per band
+/// - `radiance_count`: number of values that there is room for: bands
 ///
 /// # Safety
 /// Pointers are null or valid; `radiance` has one value per band.
@@ -389,13 +451,14 @@ pub unsafe extern "C" fn blik_solution_get_reference(
     solution: *const blik_solution,
     error: *mut blik_error,
     radiance: *mut f64,
-) -> i32 {
+    radiance_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let solution: &blik_solution = unsafe { object(solution) }?;
         let reference = solution.record.reference;
         // SAFETY: by the caller's promise.
-        let out = unsafe { output(radiance, reference.len()) }?;
+        let out = unsafe { output_of((radiance, radiance_count), reference.len(), BLIK_FIELD_RADIANCE)? };
         out.iter_mut().zip(reference).for_each(|(to, from)| *to = *from);
         Ok(())
     })

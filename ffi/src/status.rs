@@ -4,13 +4,17 @@ use blik_kernel::plane::scene::{BODY_ELEMENTS, BODY_RADIUS};
 use blik_kernel::{Error, Field};
 use core::ffi::{CStr, c_char};
 
+/// What a call returns: whether it was done, and if not, why.
+pub type blik_status = i32;
+
 /// Done.
 pub const BLIK_OK: i32 = 0;
 
 /// A pointer that must not be null is.
 pub const BLIK_ERROR_NULL: i32 = 1;
 
-/// A struct's `struct_size` is none that this library knows: it was not set by its init function.
+/// A struct's `struct_size` was not set, or is of a newer header than the library: `needed` is the library's, `given` the
+/// struct's.
 pub const BLIK_ERROR_STRUCT_SIZE: i32 = 2;
 
 /// A number stands for no choice: a type, a model, a projection, a sampling.
@@ -94,11 +98,11 @@ pub const BLIK_ERROR_INTERNAL: i32 = 28;
 /// Body `index` of a plane scene is no circle or polyline; `field` tells why.
 pub const BLIK_ERROR_BODY: i32 = 29;
 
-fn status_text(number: i32) -> &'static CStr {
+pub(crate) fn status_text(number: i32) -> &'static CStr {
     match number {
         BLIK_OK => c"done",
         BLIK_ERROR_NULL => c"a pointer is null",
-        BLIK_ERROR_STRUCT_SIZE => c"struct_size is not set, or of another version",
+        BLIK_ERROR_STRUCT_SIZE => c"struct_size is not set, or of a newer header than the library",
         BLIK_ERROR_CHOICE => c"a number stands for no choice",
         BLIK_ERROR_HANDLE => c"a handle is not valid, or belongs to another scene",
         BLIK_ERROR_BUFFER_TOO_SMALL => c"memory is too small",
@@ -129,6 +133,9 @@ fn status_text(number: i32) -> &'static CStr {
         _ => c"unknown status",
     }
 }
+
+/// What a refused call is about.
+pub type blik_field = i32;
 
 /// No field.
 pub const BLIK_FIELD_NONE: i32 = 0;
@@ -250,7 +257,49 @@ pub const BLIK_FIELD_MATERIALS: i32 = 38;
 /// Tasks at once.
 pub const BLIK_FIELD_LANES: i32 = 39;
 
-fn field_text(number: i32) -> &'static CStr {
+/// Where a ray starts.
+pub const BLIK_FIELD_RAY_ORIGIN: i32 = 40;
+
+/// Direction of a ray: not finite, or of no unit length.
+pub const BLIK_FIELD_RAY_DIRECTION: i32 = 41;
+
+/// Where hits of a ray no longer count.
+pub const BLIK_FIELD_RAY_T_MAX: i32 = 42;
+
+/// The facet that a ray leaves.
+pub const BLIK_FIELD_RAY_SKIP: i32 = 43;
+
+/// Pixels of an image.
+pub const BLIK_FIELD_PIXELS: i32 = 44;
+
+/// Terms of the radiance of an image.
+pub const BLIK_FIELD_COMPONENTS: i32 = 45;
+
+/// Areas of facets.
+pub const BLIK_FIELD_AREAS: i32 = 46;
+
+/// Irradiance of facets.
+pub const BLIK_FIELD_IRRADIANCE: i32 = 47;
+
+/// Radiance of facets or along rays.
+pub const BLIK_FIELD_RADIANCE: i32 = 48;
+
+/// Hits of rays.
+pub const BLIK_FIELD_HITS: i32 = 49;
+
+/// Signatures.
+pub const BLIK_FIELD_SIGNATURES: i32 = 50;
+
+/// Views of a signature.
+pub const BLIK_FIELD_CELLS: i32 = 51;
+
+/// Samples of the plane model.
+pub const BLIK_FIELD_SAMPLES: i32 = 52;
+
+/// Form factors.
+pub const BLIK_FIELD_FACTORS: i32 = 53;
+
+pub(crate) fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
         BLIK_FIELD_DIFFUSE => c"diffuse",
@@ -292,20 +341,34 @@ fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_FACET_NORMALS => c"facet_normals",
         BLIK_FIELD_MATERIALS => c"materials",
         BLIK_FIELD_LANES => c"lanes",
+        BLIK_FIELD_RAY_ORIGIN => c"ray origin",
+        BLIK_FIELD_RAY_DIRECTION => c"ray direction",
+        BLIK_FIELD_RAY_T_MAX => c"ray t_max",
+        BLIK_FIELD_RAY_SKIP => c"ray skip",
+        BLIK_FIELD_PIXELS => c"pixels",
+        BLIK_FIELD_COMPONENTS => c"components",
+        BLIK_FIELD_AREAS => c"areas",
+        BLIK_FIELD_IRRADIANCE => c"irradiance",
+        BLIK_FIELD_RADIANCE => c"radiance",
+        BLIK_FIELD_HITS => c"hits",
+        BLIK_FIELD_SIGNATURES => c"signatures",
+        BLIK_FIELD_CELLS => c"cells",
+        BLIK_FIELD_SAMPLES => c"samples",
+        BLIK_FIELD_FACTORS => c"factors",
         _ => c"",
     }
 }
 
 /// What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
-/// to be set before.
+/// to be set before. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct blik_error {
     /// The status that the call returned.
-    pub status: i32,
-    /// The field that it is about, one of `BLIK_FIELD_*`.
-    pub field: i32,
-    /// Index of the facet, vertex, normal or material that it is about; else 0.
+    pub status: blik_status,
+    /// What it is about.
+    pub field: blik_field,
+    /// Index of the facet, vertex, normal, material, ray or direction that it is about; else 0.
     pub index: usize,
     /// Spectral band; else 0.
     pub band: usize,
@@ -435,15 +498,18 @@ fn number(field: Field) -> i32 {
     }
 }
 
-/// The words for a status: never null, never to be freed. May be called by any number of threads at once.
+/// The words for a status: never null, never to be freed.
+///
+/// - `status`: the status
 #[unsafe(no_mangle)]
-pub extern "C" fn blik_status_text(status: i32) -> *const c_char {
+pub extern "C" fn blik_status_text(status: blik_status) -> *const c_char {
     status_text(status).as_ptr()
 }
 
-/// The name of a field as the structs spell it: never null, never to be freed; empty for no field. May be called by
-/// any number of threads at once.
+/// The name of a field as the structs spell it: never null, never to be freed; empty for no field.
+///
+/// - `field`: the field
 #[unsafe(no_mangle)]
-pub extern "C" fn blik_field_text(field: i32) -> *const c_char {
+pub extern "C" fn blik_field_text(field: blik_field) -> *const c_char {
     field_text(field).as_ptr()
 }

@@ -2,27 +2,29 @@
 
 use crate::status::*;
 use core::ffi::c_void;
-use core::ptr::null;
+use core::ptr::{NonNull, null};
 
-/// Numbers of [`blik_array`]: 32-bit floating point.
+/// Type of the numbers of a [`blik_array`].
+pub type blik_format = i32;
+
+/// Floating point, 32 bits.
 pub const BLIK_F32: i32 = 1;
-/// Numbers of [`blik_array`]: 64-bit floating point.
+/// Floating point, 64 bits.
 pub const BLIK_F64: i32 = 2;
-/// Numbers of [`blik_array`]: unsigned, 8 bits.
+/// Unsigned integers, 8 bits.
 pub const BLIK_U8: i32 = 3;
-/// Numbers of [`blik_array`]: unsigned, 16 bits.
+/// Unsigned integers, 16 bits.
 pub const BLIK_U16: i32 = 4;
-/// Numbers of [`blik_array`]: unsigned, 32 bits.
+/// Unsigned integers, 32 bits.
 pub const BLIK_U32: i32 = 5;
-
-/// Numbers of [`blik_array`]: unsigned, 64 bits.
+/// Unsigned integers, 64 bits.
 pub const BLIK_U64: i32 = 6;
 
 /// "No vertex normal" among the indices of normals.
 pub const BLIK_NO_NORMAL: u32 = 0xffff_ffff;
 
 /// An array as the caller keeps it: entries `stride` bytes apart, each of as many numbers as its use needs, packed.
-/// `count` 0: absent.
+/// `count` 0: absent. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_array {
@@ -32,15 +34,16 @@ pub struct blik_array {
     pub count: usize,
     /// Bytes from one entry to the next; 0: the size of an entry.
     pub stride: usize,
-    /// `BLIK_F32`, `BLIK_F64`, `BLIK_U8`, `BLIK_U16`, `BLIK_U32` or `BLIK_U64`.
-    pub format: i32,
+    /// Type of the numbers.
+    pub format: blik_format,
 }
 
 impl blik_array {
-    pub(crate) const NONE: blik_array = blik_array { data: null(), count: 0, stride: 0, format: 0 };
+    const NONE: blik_array = blik_array { data: null(), count: 0, stride: 0, format: 0 };
 }
 
 /// Reflectances and emission of one material, one value per band each; a null pointer stands for zeros.
+/// Arrays of it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_material {
@@ -56,11 +59,11 @@ pub struct blik_material {
     pub gloss_rays: u32,
 }
 
-/// A mesh with its materials. Set by [`blik_mesh_init`] first. Read during the call only.
+/// A mesh with its materials. Read during the call only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_mesh {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Positions: three `BLIK_F64` or `BLIK_F32` each, in any unit and at any offset.
     pub vertices: blik_array,
@@ -84,14 +87,13 @@ pub struct blik_mesh {
     pub two_sided: i32,
 }
 
-/// What decides the coupling besides the scene. Set by [`blik_settings_init`] first.
+/// What decides the coupling besides the scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_settings {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
-    /// The wanted error of an image, eq. 16 of the paper, relative to the reference radiance: 1e-6 to 0.1; default
-    /// 2e-3.
+    /// The wanted rms error of an image's pixels relative to the reference radiance: 1e-6 to 0.1; default 2e-3.
     pub tolerance: f64,
     /// Light reflected more often does not count; below 0 (default): by tolerance.
     pub max_bounces: i32,
@@ -115,27 +117,30 @@ pub struct blik_settings {
     pub image_tolerance: f64,
 }
 
-/// [`blik_sky`]: the same radiance from the whole sphere.
+/// How the radiance of a [`blik_sky`] varies with the direction.
+pub type blik_sky_model = i32;
+
+/// The same radiance from the whole sphere.
 pub const BLIK_SKY_UNIFORM: i32 = 0;
-/// [`blik_sky`]: the same radiance from above the horizon.
+/// The same radiance from above the horizon.
 pub const BLIK_SKY_HEMISPHERE: i32 = 1;
-/// [`blik_sky`]: radiance (1 + 2 sin(elevation))/3.
+/// Above the horizon radiance (1 + 2 sin(elevation))/3.
 pub const BLIK_SKY_OVERCAST: i32 = 2;
-/// [`blik_sky`]: one of the fifteen types of ISO 15469.
+/// One of the fifteen types of ISO 15469.
 pub const BLIK_SKY_CIE: i32 = 3;
-/// [`blik_sky`]: linear in the height from ground (nadir) to radiance (zenith).
+/// Linear in the height from ground (nadir) to radiance (zenith).
 pub const BLIK_SKY_GRADIENT: i32 = 4;
-/// [`blik_sky`]: samples by elevation and azimuth.
+/// Samples by elevation and azimuth, as in an environment map.
 pub const BLIK_SKY_TABLE: i32 = 5;
 
-/// A sky. Set by [`blik_sky_init`] first. Read during the call only: its arrays are copied.
+/// A sky. Read during the call only: its arrays are copied.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_sky {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
-    /// `BLIK_SKY_*`; default uniform.
-    pub model: i32,
+    /// How radiance varies; default `BLIK_SKY_UNIFORM`.
+    pub model: blik_sky_model,
     /// 1 to 15: the type of a CIE sky; default 1.
     pub cie_type: u32,
     /// Radiance per band as the model uses it (for a table a factor), W m-2 sr-1; null (default): 1.
@@ -159,11 +164,11 @@ pub struct blik_sky {
     pub table_azimuth_zero: [f64; 3],
 }
 
-/// The sun. Set by [`blik_sun_init`] first. Read during the call only.
+/// The sun. Read during the call only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_sun {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Toward the centre of the sun, of any length but zero; default (0, 0, 1).
     pub direction: [f64; 3],
@@ -173,11 +178,11 @@ pub struct blik_sun {
     pub half_angle_deg: f64,
 }
 
-/// The light of a scene. Set by [`blik_light_init`] first. Read during the call only.
+/// The light of a scene. Read during the call only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_light {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// The sky; null (default): none.
     pub sky: *const blik_sky,
@@ -187,25 +192,32 @@ pub struct blik_light {
     pub reference_radiance: *const f64,
 }
 
-/// [`blik_camera`]: parallel rays.
+/// Projection of a [`blik_camera`].
+pub type blik_projection = i32;
+
+/// Parallel rays.
 pub const BLIK_ORTHOGRAPHIC: i32 = 0;
-/// [`blik_camera`]: rays through the eye.
+/// Rays through the eye.
 pub const BLIK_PERSPECTIVE: i32 = 1;
-/// [`blik_camera`]: mean radiance over the pixel's square, background included.
+
+/// What a pixel of a [`blik_camera`] shows.
+pub type blik_sampling = i32;
+
+/// Mean radiance over the pixel's square, background included.
 pub const BLIK_SAMPLE_AREA: i32 = 0;
-/// [`blik_camera`]: radiance along the ray through the pixel's centre.
+/// Radiance along the ray through the pixel's centre.
 pub const BLIK_SAMPLE_CENTRE: i32 = 1;
 
-/// A camera. Set by [`blik_camera_init`] first. Row 0 is the top; nothing before the eye is seen.
+/// A camera. Row 0 is the top; nothing before the eye is seen.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_camera {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// `BLIK_ORTHOGRAPHIC` (default) or `BLIK_PERSPECTIVE`.
-    pub projection: i32,
+    pub projection: blik_projection,
     /// `BLIK_SAMPLE_AREA` (default) or `BLIK_SAMPLE_CENTRE`.
-    pub sampling: i32,
+    pub sampling: blik_sampling,
     /// Position of the eye, in the mesh's coordinates.
     pub eye: [f64; 3],
     /// The point in the image's middle.
@@ -222,28 +234,35 @@ pub struct blik_camera {
     pub rows: usize,
 }
 
-/// Structs whose first member tells their size.
-pub(crate) trait Sized_: Copy {
-    fn struct_size(&self) -> usize;
+/// Structs whose first member tells their size, which programs of older headers have shorter.
+pub(crate) trait Sized_: Copy + Default {
+    /// Bytes of the shortest that there ever was.
+    const FIRST: usize;
+    /// The first member.
+    fn size_mut(&mut self) -> &mut usize;
 }
 
+/// `NAME from MEMBER`: the struct ended before MEMBER once.
 macro_rules! sized {
-    ($($name:ident),*) => { $(
+    (@first $name:ident) => { size_of::<$name>() };
+    (@first $name:ident $member:ident) => { core::mem::offset_of!($name, $member) };
+    ($($name:ident $(from $member:ident)?),*) => { $(
         impl Sized_ for $name {
-            fn struct_size(&self) -> usize {
-                self.struct_size
+            const FIRST: usize = sized!(@first $name $($member)?);
+            fn size_mut(&mut self) -> &mut usize {
+                &mut self.struct_size
             }
         }
     )* };
 }
-sized!(blik_mesh, blik_settings, blik_sky, blik_sun, blik_light, blik_camera);
+sized!(blik_mesh, blik_settings from image_tolerance, blik_sky, blik_sun, blik_light, blik_camera);
 pub(crate) use sized;
 
-/// Reads a struct of the caller.
+/// The size that a struct of the caller tells: not null, aligned, and of this library's or an older header.
 ///
 /// # Safety
-/// `at` is null or points to a size that is followed by as many bytes as it says.
-pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
+/// `at` is null or points to a size.
+unsafe fn told<T: Sized_>(at: *const T) -> Result<usize, blik_error> {
     if at.is_null() {
         return Err(blik_error::of(BLIK_ERROR_NULL));
     }
@@ -252,144 +271,150 @@ pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
     }
     // SAFETY: not null, aligned, and by the caller's promise at least a size.
     let given = unsafe { at.cast::<usize>().read() };
-    if given != size_of::<T>() {
+    if !(T::FIRST..=size_of::<T>()).contains(&given) {
         return Err(blik_error::of(BLIK_ERROR_STRUCT_SIZE).sizes(size_of::<T>(), given));
     }
-    // SAFETY: the struct is as long as T.
-    let value = unsafe { at.read() };
-    debug_assert_eq!(value.struct_size(), given);
+    Ok(given)
+}
+
+/// Reads a struct of the caller; members that its header did not have yet have their defaults.
+///
+/// # Safety
+/// `at` is null or points to a size that is followed by as many bytes as it says.
+pub(crate) unsafe fn read<T: Sized_>(at: *const T) -> Result<T, blik_error> {
+    let mut value = T::default();
+    // SAFETY: the caller's struct is as long as it says, and no longer than T; any bytes make a T.
+    unsafe {
+        let given = told(at)?;
+        core::ptr::copy_nonoverlapping(at.cast::<u8>(), (&raw mut value).cast::<u8>(), given);
+    }
+    *value.size_mut() = size_of::<T>();
     Ok(value)
 }
 
-/// Sets a struct's defaults; nothing where the pointer is null.
-///
-/// # Safety
-/// `at` is null or points to memory for a T.
-pub(crate) unsafe fn set<T>(at: *mut T, value: T) {
-    if !at.is_null() && at.is_aligned() {
-        // SAFETY: by the caller's promise there is room for a T.
-        unsafe { at.write(value) };
+/// A struct of the caller that is to be written.
+pub(crate) struct Place<T> {
+    at: NonNull<T>,
+    size: usize,
+}
+
+impl<T: Sized_> Place<T> {
+    /// # Safety
+    /// `at` is null or points to a size that is followed by as many bytes as it says.
+    pub unsafe fn new(at: *mut T) -> Result<Place<T>, blik_error> {
+        // SAFETY: by the caller's promise.
+        let size = unsafe { told(at.cast_const()) }?;
+        Ok(Place { at: NonNull::new(at).ok_or(blik_error::of(BLIK_ERROR_NULL))?, size })
+    }
+
+    /// The same where `at` may be null: nobody wants it.
+    ///
+    /// # Safety
+    /// As for `new`.
+    pub unsafe fn optional(at: *mut T) -> Result<Option<Place<T>>, blik_error> {
+        // SAFETY: by the caller's promise.
+        if at.is_null() { Ok(None) } else { unsafe { Place::new(at) }.map(Some) }
+    }
+
+    /// Writes what the caller's header has of it.
+    pub fn write(self, mut value: T) {
+        *value.size_mut() = self.size;
+        // SAFETY: by the promise of `new` there are so many bytes, no more than a T has.
+        unsafe {
+            let from = (&raw const value).cast::<u8>();
+            core::ptr::copy_nonoverlapping(from, self.at.as_ptr().cast::<u8>(), self.size);
+        }
     }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `mesh` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_mesh_init(mesh: *mut blik_mesh) {
-    let none = blik_array::NONE;
-    let value = blik_mesh {
-        struct_size: size_of::<blik_mesh>(),
-        vertices: blik_array { format: BLIK_F64, ..none },
-        facets: blik_array { format: BLIK_U32, ..none },
-        facet_materials: blik_array { format: BLIK_U32, ..none },
-        normals: blik_array { format: BLIK_F64, ..none },
-        facet_normals: blik_array { format: BLIK_U32, ..none },
-        materials: null(),
-        material_count: 0,
-        material_stride: size_of::<blik_material>(),
-        bands: 1,
-        two_sided: 0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(mesh, value) };
+impl Default for blik_mesh {
+    fn default() -> blik_mesh {
+        let none = blik_array::NONE;
+        blik_mesh {
+            struct_size: size_of::<blik_mesh>(),
+            vertices: blik_array { format: BLIK_F64, ..none },
+            facets: blik_array { format: BLIK_U32, ..none },
+            facet_materials: blik_array { format: BLIK_U32, ..none },
+            normals: blik_array { format: BLIK_F64, ..none },
+            facet_normals: blik_array { format: BLIK_U32, ..none },
+            materials: null(),
+            material_count: 0,
+            material_stride: size_of::<blik_material>(),
+            bands: 1,
+            two_sided: 0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `settings` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_settings_init(settings: *mut blik_settings) {
-    let value = blik_settings {
-        struct_size: size_of::<blik_settings>(),
-        tolerance: 2e-3,
-        max_bounces: -1,
-        all_irradiances: 0,
-        directional: 1,
-        fit_memory: 0,
-        ray_budget: 0,
-        image_tolerance: 0.0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(settings, value) };
+impl Default for blik_settings {
+    fn default() -> blik_settings {
+        blik_settings {
+            struct_size: size_of::<blik_settings>(),
+            tolerance: 2e-3,
+            max_bounces: -1,
+            all_irradiances: 0,
+            directional: 1,
+            fit_memory: 0,
+            ray_budget: 0,
+            image_tolerance: 0.0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `sky` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_sky_init(sky: *mut blik_sky) {
-    let value = blik_sky {
-        struct_size: size_of::<blik_sky>(),
-        model: BLIK_SKY_UNIFORM,
-        cie_type: 1,
-        radiance: null(),
-        ground: null(),
-        up: [0.0, 0.0, 1.0],
-        sun_direction: [0.0; 3],
-        table: null(),
-        table_rows: 0,
-        table_columns: 0,
-        table_bands: 1,
-        table_azimuth_zero: [0.0; 3],
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(sky, value) };
+impl Default for blik_sky {
+    fn default() -> blik_sky {
+        blik_sky {
+            struct_size: size_of::<blik_sky>(),
+            model: BLIK_SKY_UNIFORM,
+            cie_type: 1,
+            radiance: null(),
+            ground: null(),
+            up: [0.0, 0.0, 1.0],
+            sun_direction: [0.0; 3],
+            table: null(),
+            table_rows: 0,
+            table_columns: 0,
+            table_bands: 1,
+            table_azimuth_zero: [0.0; 3],
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `sun` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_sun_init(sun: *mut blik_sun) {
-    let value = blik_sun {
-        struct_size: size_of::<blik_sun>(),
-        direction: [0.0, 0.0, 1.0],
-        irradiance: null(),
-        half_angle_deg: 0.2665,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(sun, value) };
+impl Default for blik_sun {
+    fn default() -> blik_sun {
+        blik_sun {
+            struct_size: size_of::<blik_sun>(),
+            direction: [0.0, 0.0, 1.0],
+            irradiance: null(),
+            half_angle_deg: 0.2665,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `light` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_light_init(light: *mut blik_light) {
-    let value = blik_light {
-        struct_size: size_of::<blik_light>(),
-        sky: null(),
-        sun: null(),
-        reference_radiance: null(),
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(light, value) };
+impl Default for blik_light {
+    fn default() -> blik_light {
+        blik_light {
+            struct_size: size_of::<blik_light>(),
+            sky: null(),
+            sun: null(),
+            reference_radiance: null(),
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `camera` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_camera_init(camera: *mut blik_camera) {
-    let value = blik_camera {
-        struct_size: size_of::<blik_camera>(),
-        projection: BLIK_ORTHOGRAPHIC,
-        sampling: BLIK_SAMPLE_AREA,
-        eye: [0.0; 3],
-        target: [0.0; 3],
-        up: [0.0, 0.0, 1.0],
-        height: 0.0,
-        fov_deg: 0.0,
-        columns: 0,
-        rows: 0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(camera, value) };
+impl Default for blik_camera {
+    fn default() -> blik_camera {
+        blik_camera {
+            struct_size: size_of::<blik_camera>(),
+            projection: BLIK_ORTHOGRAPHIC,
+            sampling: BLIK_SAMPLE_AREA,
+            eye: [0.0; 3],
+            target: [0.0; 3],
+            up: [0.0, 0.0, 1.0],
+            height: 0.0,
+            fov_deg: 0.0,
+            columns: 0,
+            rows: 0,
+        }
+    }
 }

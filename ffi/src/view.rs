@@ -3,7 +3,7 @@
 use crate::call;
 use crate::memory::*;
 use crate::run::{Runner, Start, blik_run};
-use crate::scene::blik_ray;
+use crate::scene::{blik_ray, check, inside};
 use crate::solution::blik_solution;
 use crate::status::*;
 use crate::types::*;
@@ -13,7 +13,6 @@ use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
 use blik_kernel::chain::{Sample, Terms, Work};
 use blik_kernel::image::{self, Tally, Target, piece};
 use blik_kernel::math::Vec3;
-use blik_kernel::ray::Ray;
 use blik_kernel::scene::{MAX_BANDS, Scene};
 use blik_kernel::signature::{self, Signature, View};
 use blik_kernel::{facets, policy};
@@ -22,8 +21,10 @@ use core::ops::Range;
 
 /// What was done on rows of an image; tallies of all its rows add up by [`blik_tally_add`].
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct blik_tally {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Pixels whose centre ray meets the object.
     pub object_pixels: u64,
     /// Rays through pixels.
@@ -40,9 +41,17 @@ pub struct blik_tally {
     pub chain_tail: f64,
 }
 
+impl Default for blik_tally {
+    fn default() -> blik_tally {
+        blik_tally::new(&Tally::default())
+    }
+}
+sized!(blik_tally);
+
 impl blik_tally {
     fn new(tally: &Tally) -> blik_tally {
         blik_tally {
+            struct_size: size_of::<blik_tally>(),
             object_pixels: tally.object_pixels,
             primary_rays: tally.primary,
             chain_rays: tally.chain,
@@ -66,20 +75,27 @@ impl blik_tally {
     }
 }
 
-/// Adds `next` to `sum`; nothing where either is null.
+/// Adds the tally of other rows of an image.
+///
+/// - `sum`: the sum so far, and the new one
+/// - `next`: what is added
 ///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_tally_add(sum: *mut blik_tally, next: *const blik_tally) {
-    if let (Ok(sum), Ok(next)) = (needed(sum), needed(next.cast_mut())) {
-        // SAFETY: not null, and valid by the caller's promise.
-        unsafe {
-            let mut all = sum.read().kernel();
-            all.add(&next.read().kernel());
-            sum.write(blik_tally::new(&all));
-        }
-    }
+pub unsafe extern "C" fn blik_tally_add(
+    sum: *mut blik_tally,
+    next: *const blik_tally,
+    error: *mut blik_error,
+) -> blik_status {
+    call(error, || {
+        // SAFETY: by the caller's promise.
+        let (to, so_far, next) = unsafe { (Place::new(sum)?, read(sum.cast_const())?, read(next)?) };
+        let mut all = so_far.kernel();
+        all.add(&next.kernel());
+        to.write(blik_tally::new(&all));
+        Ok(())
+    })
 }
 
 /// The kernel's camera.
@@ -114,6 +130,10 @@ fn scratch_parts(camera: &Camera, bands: usize) -> Result<(usize, usize), blik_e
 
 /// Bytes of scratch memory with which [`blik_image`] keeps all lanes of `run` busy.
 ///
+/// - `solution`: the solution
+/// - `camera`: the camera
+/// - `bytes`: receives the bytes; less is for fewer lanes
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -123,7 +143,7 @@ pub unsafe extern "C" fn blik_image_scratch_size(
     run: *const blik_run,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -167,23 +187,21 @@ struct Out<'a> {
 
 impl Out<'_> {
     /// # Safety
-    /// Arrays have as many entries as said, `components` three times as many, or none.
+    /// Arrays have as many entries as said.
     unsafe fn new<'a>(
-        pixels: *mut f32,
-        count: usize,
-        components: *mut f32,
+        pixels: (*mut f32, usize),
+        components: (*mut f32, usize),
         expected: usize,
     ) -> Result<Out<'a>, blik_error> {
-        if count != expected {
-            return Err(blik_error::of(BLIK_ERROR_LENGTH).sizes(expected, count));
-        }
         // SAFETY: by the caller's promise.
-        let pixels = unsafe { output(pixels, count) }?;
-        if components.is_null() {
+        let (pixels, all) = unsafe {
+            let pixels = output_of(pixels, expected, BLIK_FIELD_PIXELS)?;
+            (pixels, optional_output(components, 3 * expected, BLIK_FIELD_COMPONENTS)?)
+        };
+        if all.is_empty() {
             return Ok(Out { pixels, components: [&mut [], &mut [], &mut []] });
         }
-        // SAFETY: by the caller's promise.
-        let all = unsafe { output(components, 3 * count) }?;
+        let count = expected;
         let parts = all.split_at_mut_checked(count).and_then(|(a, rest)| {
             let (b, c) = rest.split_at_mut_checked(count)?;
             Some([a, b, c])
@@ -193,13 +211,16 @@ impl Out<'_> {
     }
 }
 
-/// The whole image that a camera sees: `pixels` holds rows x columns x bands values, row 0 at the top, bands innermost,
-/// and `count` is their number. `components` is null or has room for three such images, the terms of eq. (11): diffuse,
-/// mirrored sky, mirrored diffuse. `tally` may be null.
+/// The image that a camera sees, row 0 at the top, bands innermost. A call that is cancelled leaves part of it written.
 ///
-/// `scratch` is memory of [`blik_image_scratch_size`] bytes, or less, for fewer lanes; with the standard library it may
-/// be null, and is then taken from the heap. Bits do not depend on `run`. A call that is cancelled leaves part of the
-/// pixels written.
+/// - `solution`: the solution
+/// - `camera`: the camera
+/// - `pixels`: receives radiance by row, column and band: rows x columns x bands values
+/// - `pixel_count`: number of values that there is room for: exactly so many
+/// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
+///   and sun, mirrored diffuse. Null: not wanted
+/// - `component_count`: number of values that there is room for: three times `pixel_count`
+/// - `tally`: receives what was done, for [`blik_get_report`]; its `struct_size` is set before. Null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -212,10 +233,11 @@ pub unsafe extern "C" fn blik_image(
     scratch_size: usize,
     error: *mut blik_error,
     pixels: *mut f32,
-    count: usize,
+    pixel_count: usize,
     components: *mut f32,
+    component_count: usize,
     tally: *mut blik_tally,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
@@ -223,16 +245,18 @@ pub unsafe extern "C" fn blik_image(
         let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
         let bands = solution.record.shape.bands;
         // SAFETY: by the caller's promise.
-        let mut out =
-            unsafe { Out::new(pixels, count, components, camera.rows() * camera.columns() * bands) }?;
+        let (mut out, tally) = unsafe {
+            let expected = camera.rows() * camera.columns() * bands;
+            let out = Out::new((pixels, pixel_count), (components, component_count), expected)?;
+            (out, Place::optional(tally)?)
+        };
         let (fixed, lane) = scratch_parts(&camera, bands)?;
         let wanted = fixed + lane * runner.lanes();
         let work = |given: &mut [u8]| paint(solution, &camera, &mut out, given, &mut runner);
         // SAFETY: by the caller's promise.
         let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
-        if let Ok(to) = needed(tally) {
-            // SAFETY: not null.
-            unsafe { to.write(blik_tally::new(&sum)) };
+        if let Some(to) = tally {
+            to.write(blik_tally::new(&sum));
         }
         Ok(())
     })
@@ -290,9 +314,19 @@ fn paint(
     Ok(sum)
 }
 
-/// Rows `first` .. `first + rows` of the image that a camera sees, for schedulers and processes of the caller: `pixels`
-/// holds rows x columns x bands values. However an image is split into rows, its bits are the same. `scratch` as for
-/// [`blik_image`], of one lane; `components` and `tally` as there.
+/// Rows of the image that a camera sees, for schedulers and processes of the caller. However an image is split, its bits
+/// are the same.
+///
+/// - `solution`: the solution
+/// - `camera`: the camera
+/// - `first`: index of the first row
+/// - `rows`: number of rows
+/// - `pixels`: receives radiance by row, column and band: `rows` x columns x bands values
+/// - `pixel_count`: number of values that there is room for: exactly so many
+/// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
+///   and sun, mirrored diffuse. Null: not wanted
+/// - `component_count`: number of values that there is room for: three times `pixel_count`
+/// - `tally`: receives what was done, for [`blik_get_report`]; its `struct_size` is set before. Null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -306,10 +340,11 @@ pub unsafe extern "C" fn blik_image_rows(
     scratch_size: usize,
     error: *mut blik_error,
     pixels: *mut f32,
-    count: usize,
+    pixel_count: usize,
     components: *mut f32,
+    component_count: usize,
     tally: *mut blik_tally,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let solution: &blik_solution = unsafe { object(solution) }?;
@@ -319,16 +354,18 @@ pub unsafe extern "C" fn blik_image_rows(
         let range = rows_of(first, rows, camera.rows())?;
         let expected = rows * camera.columns() * bands;
         // SAFETY: by the caller's promise.
-        let out = unsafe { Out::new(pixels, count, components, expected) }?;
+        let (out, tally) = unsafe {
+            let out = Out::new((pixels, pixel_count), (components, component_count), expected)?;
+            (out, Place::optional(tally)?)
+        };
         let mut target = Target { image: out.pixels, components: out.components };
         let wanted = image::scratch_bytes(&camera, bands)?;
         let work =
             |given: &mut [u8]| Ok(image::rows(&solution.solved(), &camera, range, &mut target, given)?);
         // SAFETY: by the caller's promise.
         let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
-        if let Ok(to) = needed(tally) {
-            // SAFETY: not null.
-            unsafe { to.write(blik_tally::new(&sum)) };
+        if let Some(to) = tally {
+            to.write(blik_tally::new(&sum));
         }
         Ok(())
     })
@@ -350,6 +387,9 @@ fn lane_bytes() -> Result<usize, blik_error> {
 
 /// Bytes of scratch memory with which [`blik_radiance`] and [`blik_signatures`] keep all lanes of `run` busy.
 ///
+/// - `solution`: the solution
+/// - `bytes`: receives the bytes; less is for fewer lanes
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -358,7 +398,7 @@ pub unsafe extern "C" fn blik_radiance_scratch_size(
     run: *const blik_run,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -392,10 +432,13 @@ fn follow(
 /// Rays of one piece.
 const RAYS: usize = 256;
 
-/// Radiance against each of `count` rays of any origin and direction: `radiance` has one value per band for each.
+/// Radiance against rays.
 ///
-/// `scratch` is memory of [`blik_radiance_scratch_size`] bytes, or less, for fewer lanes; with the standard library it
-/// may be null, and is then taken from the heap.
+/// - `solution`: the solution
+/// - `rays`: the rays, as for [`blik_closest_hits`]
+/// - `count`: number of rays
+/// - `radiance`: receives one value a ray and band, bands innermost
+/// - `radiance_count`: number of values that there is room for: `count` x bands
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -409,15 +452,19 @@ pub unsafe extern "C" fn blik_radiance(
     scratch_size: usize,
     error: *mut blik_error,
     radiance: *mut f64,
-) -> i32 {
+    radiance_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         let bands = solution.record.shape.bands;
         let all = count.checked_mul(bands).ok_or(blik_error::of(BLIK_ERROR_TOO_MANY))?;
         // SAFETY: by the caller's promise.
-        let (rays, out) = unsafe { (input(rays, count)?, output(radiance, all)?) };
+        let (rays, out) = unsafe {
+            (input(rays, count)?, output_of((radiance, radiance_count), all, BLIK_FIELD_RADIANCE)?)
+        };
         let (solved, scene) = (solution.solved(), &solution.coupling.base.scene);
+        check(scene, rays)?;
         let start = Start(out.as_mut_ptr());
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
@@ -432,12 +479,7 @@ pub unsafe extern "C" fn blik_radiance(
                 let out =
                     unsafe { core::slice::from_raw_parts_mut(start.at(first * bands), own.len() * bands) };
                 for ((index, ray), out) in (first..).zip(own).zip(out.chunks_exact_mut(bands.max(1))) {
-                    let ray = Ray {
-                        origin: scene.to_scene(Vec3::from_array(ray.origin)),
-                        direction: Vec3::from_array(ray.direction),
-                        t_max: ray.t_max * scene.scale(),
-                        skip: ray.skip,
-                    };
+                    let ray = inside(scene, ray);
                     terms.clear(bands);
                     let hit = solution.coupling.base.bvh.closest(&ray);
                     solved.radiance_at((&ray, hit), Sample::Alone(index as u32), terms, work);
@@ -451,7 +493,7 @@ pub unsafe extern "C" fn blik_radiance(
     })
 }
 
-/// What a distant observer measures in one direction and band.
+/// What a distant observer measures in one direction and band. Arrays of it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_signature {
@@ -465,8 +507,8 @@ pub struct blik_signature {
     pub background: f64,
     /// (mean radiance - background)/background; 0 where the background is 0.
     pub contrast: f64,
-    /// What the radiant intensity is expected to be wrong by, W/sr.
-    pub error: f64,
+    /// Expected error of the radiant intensity, W/sr.
+    pub error_estimate: f64,
     /// Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr; not
     /// among the error.
     pub unresolved_glints: f64,
@@ -475,10 +517,15 @@ pub struct blik_signature {
 /// Cells along a side of a view.
 const MOST_CELLS: usize = 65536;
 
-/// What distant observers measure of the whole object, without an image: for each of `views` directions (three numbers,
-/// from the observer toward the object) one entry per band. `cells` along each side of the projection are sampled by
-/// one ray each; 0: by tolerance; at most 65536. Views are shared out over the lanes of `run`. Scratch memory as for
-/// [`blik_radiance`].
+/// What distant observers measure of the whole object, without an image.
+///
+/// - `solution`: the solution
+/// - `directions`: three numbers a view, from the observer toward the object, of any length but zero
+/// - `direction_count`: number of views
+/// - `cells`: cells along each side of the projection, one ray each, up to 65536; 0: by tolerance
+/// - `signatures`: receives one entry a view and band, bands innermost
+/// - `signature_count`: number of entries that there is room for: views x bands
+/// - `signature_stride`: bytes from one entry to the next: `sizeof(blik_signature)`
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -486,40 +533,46 @@ const MOST_CELLS: usize = 65536;
 pub unsafe extern "C" fn blik_signatures(
     solution: *const blik_solution,
     directions: *const f64,
-    views: usize,
+    direction_count: usize,
     cells: usize,
     run: *const blik_run,
     scratch: *mut c_void,
     scratch_size: usize,
     error: *mut blik_error,
     signatures: *mut blik_signature,
-) -> i32 {
+    signature_count: usize,
+    signature_stride: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         let bands = solution.record.shape.bands;
         let too_many = blik_error::of(BLIK_ERROR_TOO_MANY);
+        let views = direction_count;
         let (all, numbers) =
             (views.checked_mul(bands).ok_or(too_many)?, views.checked_mul(3).ok_or(too_many)?);
         // SAFETY: by the caller's promise.
-        let (directions, out) = unsafe { (input(directions, numbers)?, output(signatures, all)?) };
+        let (directions, out) = unsafe {
+            let out = Signatures::new(signatures, (signature_count, all), signature_stride)?;
+            (input(directions, numbers)?, out)
+        };
         let cells = if cells == 0 {
             policy::signature_cells(solution.coupling.settings.asked.tolerance)
         } else {
             cells
         };
         if cells > MOST_CELLS {
-            return Err(too_many.sizes(MOST_CELLS, cells));
+            return Err(too_many.field(BLIK_FIELD_CELLS).sizes(MOST_CELLS, cells));
         }
-        let out = Start(out.as_mut_ptr());
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
             follow(views, given, &mut runner, |view, memory| {
                 let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
                 let direction = Vec3::from_array(direction.unwrap_or_default());
-                // SAFETY: every view is handed out once, and its entries lie within the array.
-                let out = unsafe { core::slice::from_raw_parts_mut(out.at(view * bands), bands) };
-                measure(solution, direction, cells, memory, out)
+                let measured = measure(solution, direction, cells, memory, |band, signature| {
+                    out.put(view * bands + band, signature);
+                });
+                measured.map_err(|error| blik_error { index: view, ..error })
             })
         };
         // SAFETY: by the caller's promise.
@@ -527,40 +580,91 @@ pub unsafe extern "C" fn blik_signatures(
     })
 }
 
+/// The caller's array of signatures, whose header may have shorter ones.
+struct Signatures {
+    start: Start<u8>,
+    stride: usize,
+}
+
+impl Signatures {
+    /// The shortest that there ever was.
+    const FIRST: usize = size_of::<blik_signature>();
+
+    /// # Safety
+    /// `at` is null or has room for `count` entries of `stride` bytes.
+    unsafe fn new(
+        at: *mut blik_signature,
+        (count, wanted): (usize, usize),
+        stride: usize,
+    ) -> Result<Signatures, blik_error> {
+        let refused = |status| blik_error::of(status).field(BLIK_FIELD_SIGNATURES);
+        if count != wanted {
+            return Err(refused(BLIK_ERROR_LENGTH).sizes(wanted, count));
+        }
+        if stride < Signatures::FIRST {
+            return Err(refused(BLIK_ERROR_STRUCT_SIZE).sizes(Signatures::FIRST, stride));
+        }
+        let bytes = stride.checked_mul(count).ok_or(refused(BLIK_ERROR_TOO_MANY))?;
+        // SAFETY: by the caller's promise.
+        let out = unsafe { output(at.cast::<u8>(), bytes) }?;
+        Ok(Signatures { start: Start(out.as_mut_ptr()), stride })
+    }
+
+    /// Writes an entry, which nobody else does.
+    fn put(&self, index: usize, value: blik_signature) {
+        let size = self.stride.min(size_of::<blik_signature>());
+        // SAFETY: within the caller's array by the promise of `new` and the indices of the views.
+        unsafe {
+            let from = (&raw const value).cast::<u8>();
+            core::ptr::copy_nonoverlapping(from, self.start.at(index * self.stride), size);
+        }
+    }
+}
+
+/// Measures one view; `put` takes the signature of each band.
 fn measure(
     solution: &blik_solution,
     forward: Vec3,
     cells: usize,
     scratch: &mut [u8],
-    out: &mut [blik_signature],
+    put: impl Fn(usize, blik_signature),
 ) -> Result<(), blik_error> {
     let solved = solution.solved();
     let view = View::new(&solved, forward, cells)?;
     let (scratch, rest) = scratch.split_at_mut_checked(signature::scratch_bytes()?).unwrap_or_default();
     let sums = signature::whole(&solved, &view, scratch)?;
-    let background = Arena::new(rest, 0)?.take::<f64>(out.len())?;
+    let background = Arena::new(rest, 0)?.take::<f64>(solution.record.shape.bands)?;
     if let Some(sky) = &solution.light.sky {
         sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
-    for (band, (out, &mut background)) in out.iter_mut().zip(background).enumerate() {
+    for (band, &mut background) in background.iter_mut().enumerate() {
         let reference = solution.solved().reference.get(band).copied().unwrap_or(0.0);
         let own = Signature::new(sums, band, reference, background);
-        *out = blik_signature {
+        let signature = blik_signature {
             radiant_intensity: own.intensity,
             projected_area: sums.area,
             mean_radiance: own.mean_radiance,
             background,
             contrast: own.contrast.unwrap_or(0.0),
-            error: own.error,
+            error_estimate: own.error,
             unresolved_glints: own.unresolved,
         };
+        put(band, signature);
     }
     Ok(())
 }
 
-/// Area, mean irradiance (all that arrives, not divided by pi) and diffuse radiance of facets `first` ..
-/// `first + count`: `areas` has one value a facet, `irradiance` and `radiance` one per facet, side and band, bands
-/// innermost. Any of the three may be null. Degenerate facets: zeros.
+/// Area, mean irradiance (all that arrives, not divided by pi) and diffuse radiance of facets. Degenerate facets: zeros.
+///
+/// - `solution`: the solution
+/// - `first`: index of the first facet
+/// - `count`: number of facets
+/// - `areas`: receives one value a facet; null: not wanted
+/// - `area_count`: number of values that there is room for: `count`
+/// - `irradiance`: receives one value a facet, side and band, bands innermost; null: not wanted
+/// - `irradiance_count`: number of values that there is room for: `count` x sides x bands
+/// - `radiance`: receives as many; null: not wanted
+/// - `radiance_count`: number of values that there is room for: `count` x sides x bands
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -571,9 +675,12 @@ pub unsafe extern "C" fn blik_facets(
     count: usize,
     error: *mut blik_error,
     areas: *mut f64,
+    area_count: usize,
     irradiance: *mut f64,
+    irradiance_count: usize,
     radiance: *mut f64,
-) -> i32 {
+    radiance_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let solution: &blik_solution = unsafe { object(solution) }?;
@@ -581,14 +688,13 @@ pub unsafe extern "C" fn blik_facets(
         let coupling = solution.coupling.matrix()?;
         let (bands, sides) = (solution.record.shape.bands, scene.sides());
         let range = rows_of(first, count, scene.facets())?;
-        let of = |at: *mut f64, size: usize| if at.is_null() { 0 } else { size };
         let size = count * sides * bands;
         // SAFETY: by the caller's promise.
         let (areas, irradiance, radiance) = unsafe {
             (
-                output(areas, of(areas, count))?,
-                output(irradiance, of(irradiance, size))?,
-                output(radiance, of(radiance, size))?,
+                optional_output((areas, area_count), count, BLIK_FIELD_AREAS)?,
+                optional_output((irradiance, irradiance_count), size, BLIK_FIELD_IRRADIANCE)?,
+                optional_output((radiance, radiance_count), size, BLIK_FIELD_RADIANCE)?,
             )
         };
         for (area, facet) in areas.iter_mut().zip(range.clone()) {

@@ -1,5 +1,6 @@
 /* The C interface from C: caller memory, own memory, errors. Exit 0 when all is as stated; compiled as C99 to C23. */
 #include <blik.h>
+#include <blik_plane.h>
 
 #include <math.h>
 #include <stdio.h>
@@ -55,14 +56,17 @@ static void check_facets(const blik_solution *solution)
     blik_error error;
     double radiance[12], irradiance[12], areas[12];
     int i;
-    REQUIRE(blik_facets(solution, 0, 12, &error, areas, irradiance, radiance) == BLIK_OK);
+    REQUIRE(blik_facets(solution, 0, 12, &error, areas, 12, irradiance, 12, radiance, 12) == BLIK_OK);
     for (i = 0; i < 12; ++i) {
         REQUIRE(fabs(areas[i] - 0.5) < 1e-12);
         /* the sweeps end at a thousandth of the tolerance */
         REQUIRE(fabs(radiance[i] - 2.0) < 2e-4);
     }
-    REQUIRE(blik_facets(solution, 5, 8, &error, areas, irradiance, radiance) == BLIK_ERROR_RANGE);
+    REQUIRE(blik_facets(solution, 5, 8, &error, areas, 8, irradiance, 8, radiance, 8) == BLIK_ERROR_RANGE);
     REQUIRE(error.field == BLIK_FIELD_ROWS);
+    /* arrays for fewer facets, sides or bands than the solution has */
+    REQUIRE(blik_facets(solution, 0, 12, &error, NULL, 0, irradiance, 6, NULL, 0) == BLIK_ERROR_LENGTH);
+    REQUIRE(error.field == BLIK_FIELD_IRRADIANCE && error.needed == 12 && error.given == 6);
 }
 
 static void check_image(const blik_solution *solution)
@@ -74,6 +78,8 @@ static void check_image(const blik_solution *solution)
     float pixels[64];
     size_t bytes = 0, i;
     void *scratch;
+    blik_tally_init(&tally);
+    blik_report_init(&report);
     blik_camera_init(&camera);
     camera.projection = BLIK_PERSPECTIVE;
     camera.fov_deg = 60;
@@ -87,17 +93,18 @@ static void check_image(const blik_solution *solution)
     camera.rows = 8;
     REQUIRE(blik_image_scratch_size(solution, &camera, NULL, &error, &bytes) == BLIK_OK);
     scratch = memory(bytes);
-    REQUIRE(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, 64, NULL, &tally) == BLIK_OK);
+    REQUIRE(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, 64, NULL, 0,
+                       &tally) == BLIK_OK);
     for (i = 0; i < 64; ++i) {
         REQUIRE(fabs((double)pixels[i] - 2.0) < 2e-2);
     }
     REQUIRE(tally.object_pixels == 64);
     REQUIRE(blik_get_report(solution, &tally, &error, &report) == BLIK_OK);
     REQUIRE(report.tolerance == 1e-2 && report.error_estimate < 0.1);
-    REQUIRE(blik_image(solution, &camera, NULL, scratch, 8, &error, pixels, 64, NULL, NULL) ==
+    REQUIRE(blik_image(solution, &camera, NULL, scratch, 8, &error, pixels, 64, NULL, 0, NULL) ==
             BLIK_ERROR_BUFFER_TOO_SMALL);
     REQUIRE(error.needed > 8 && error.given == 8);
-    REQUIRE(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, 63, NULL, NULL) ==
+    REQUIRE(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, 63, NULL, 0, NULL) ==
             BLIK_ERROR_LENGTH);
     free(scratch);
 }
@@ -114,9 +121,9 @@ static void check_plane(void)
     blik_plane_light light;
     blik_plane_sample samples[50];
     blik_plane_lobe lobe;
-    const blik_plane_scene *scene = NULL;
-    const blik_plane_coupling *coupling = NULL;
-    const blik_plane_solution *solution = NULL;
+    blik_plane_scene *scene = NULL;
+    blik_plane_coupling *coupling = NULL;
+    blik_plane_solution *solution = NULL;
     void *blocks[4];
     size_t bytes = 0;
     int i;
@@ -151,14 +158,15 @@ static void check_plane(void)
     REQUIRE(blik_plane_solution_init(coupling, &light, NULL, blocks[2], bytes, &error, &solution) == BLIK_OK);
     REQUIRE(blik_plane_scratch_size(solution, NULL, &error, &bytes) == BLIK_OK);
     blocks[3] = memory(bytes);
-    REQUIRE(blik_plane_image(solution, 0.0, 50, 0, 50, NULL, blocks[3], bytes, &error, samples) == BLIK_OK);
+    REQUIRE(blik_plane_image(solution, 0.0, 50, 0, 50, NULL, blocks[3], bytes, &error, samples, 50) == BLIK_OK);
     for (i = 0; i < 50; ++i) {
         REQUIRE(samples[i].object == 1 ? samples[i].radiance > 0.15 && samples[i].radiance < 0.5
                                        : samples[i].radiance == 1.0);
     }
     /* seen from the side on which the line between the centres is the axis, the image is its own mirror image */
     REQUIRE(fabs(samples[3].radiance - samples[46].radiance) < 1e-4);
-    REQUIRE(blik_plane_image(solution, 0.0, 50, 1, 50, NULL, blocks[3], bytes, &error, samples) == BLIK_ERROR_RANGE);
+    REQUIRE(blik_plane_image(solution, 0.0, 50, 1, 50, NULL, blocks[3], bytes, &error, samples, 50) ==
+            BLIK_ERROR_RANGE);
     REQUIRE(blik_plane_gloss(10.0, 1.0, 0.0, &error, &lobe) == BLIK_OK && lobe.albedo == 1.0);
     for (i = 4; i > 0; --i) {
         free(blocks[i - 1]);
@@ -173,11 +181,11 @@ int main(void)
     blik_settings settings;
     blik_light light;
     blik_run run;
-    const blik_scene *scene = NULL;
-    const blik_coupling *coupling = NULL;
-    const blik_solution *solution = NULL;
+    blik_scene *scene = NULL;
+    blik_coupling *coupling = NULL;
+    blik_solution *solution = NULL;
     size_t bytes = 0;
-    int32_t status;
+    blik_status status;
     int calls = 0;
     void *blocks[3];
 
@@ -221,7 +229,8 @@ int main(void)
     {
         static const double down[3] = {0, 0, -1};
         blik_signature signature;
-        REQUIRE(blik_signatures(solution, down, 1, 65537, NULL, NULL, 0, &error, &signature) == BLIK_ERROR_TOO_MANY);
+        REQUIRE(blik_signatures(solution, down, 1, 65537, NULL, NULL, 0, &error, &signature, 1, sizeof signature) ==
+                BLIK_ERROR_TOO_MANY);
         REQUIRE(error.needed == 65536);
         material.emission = (const double *)(const void *)((const char *)&one + 1);
         REQUIRE(blik_scene_size(&mesh, &error, &bytes) == BLIK_ERROR_ALIGNMENT && error.index == 0);

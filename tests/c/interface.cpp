@@ -45,12 +45,12 @@ int main() {
     REQUIRE(alone.pixels == threaded.pixels && alone.pixels.size() == 9 * 7 * 2);
 
     // rows by rows, and relit: the same coupling, other light
-    blik_tally sum{};
+    blik_tally sum = blik::tally();
     std::vector<float> pixels;
     for (std::size_t row = 0; row < 7; ++row) {
         const blik::image part = solution.image_rows(camera, row, 1);
         pixels.insert(pixels.end(), part.pixels.begin(), part.pixels.end());
-        blik_tally_add(&sum, &part.tally);
+        blik::add(sum, part.tally);
     }
     REQUIRE(pixels == alone.pixels && sum.object_pixels == alone.tally.object_pixels);
     REQUIRE(solution.report(alone.tally).tolerance == 2e-2);
@@ -84,7 +84,8 @@ int main() {
     REQUIRE(moved.solution() != nullptr && moved.solution()->image(camera).pixels == solution.image(camera).pixels);
     const blik::light sun(sky, blik::sun({1, 0, 1}));
     REQUIRE(blik::solution(moved.coupling(), sun).image(camera).pixels == alone.pixels);
-    REQUIRE(blik::loaded(unsolved).solution() == nullptr && moved.scene().info().facets == 4);
+    const blik::loaded dark(unsolved);
+    REQUIRE(dark.solution() == nullptr && moved.scene().info().facets == 4);
 
     // rays traced by somebody else: another scene's tree, and one whose answers are all wrong
     struct tracer {
@@ -100,7 +101,7 @@ int main() {
         for (std::size_t i = 0; i < count; ++i) {
             blik_hit hit;
             hit.facet = 3;
-            if (self.right && blik_closest_hits(self.scene.get(), sent + i, 1, nullptr, nullptr, &hit) != BLIK_OK) {
+            if (self.right && blik_closest_hits(self.scene.get(), sent + i, 1, nullptr, nullptr, &hit, 1) != BLIK_OK) {
                 std::abort();
             }
             found[i] = self.right || i % 2 == 0 ? hit.facet : 1000;
@@ -109,7 +110,7 @@ int main() {
     const auto any_facets = [](void *user, const blik_ray *sent, std::size_t count, uint8_t *found) {
         static_cast<tracer *>(user)->shadows += count;
         static_cast<tracer *>(user)->shadow_calls += 1;
-        if (blik_any_hits(static_cast<tracer *>(user)->scene.get(), sent, count, nullptr, nullptr, found) != BLIK_OK) {
+        if (blik_any_hits(static_cast<tracer *>(user)->scene.get(), sent, count, nullptr, nullptr, found, count) != BLIK_OK) {
             std::abort();
         }
     };
@@ -169,9 +170,10 @@ int main() {
     REQUIRE(blik_coupling_size(scene.get(), &fine, &told_why, &room) == BLIK_OK);
     room += full.info().bytes / 4;
     std::vector<unsigned char> little(room);
-    const blik_coupling *squeezed = nullptr;
+    blik_coupling *squeezed = nullptr;
     REQUIRE(blik_coupling_init(scene.get(), &fine, nullptr, little.data(), room, &told_why, &squeezed) == BLIK_OK);
-    blik_coupling_info squeezed_info{};
+    blik_coupling_info squeezed_info;
+    blik_coupling_info_init(&squeezed_info);
     REQUIRE(blik_coupling_get_info(squeezed, nullptr, &squeezed_info) == BLIK_OK);
     REQUIRE(squeezed_info.bytes <= room && squeezed_info.rays < full.info().rays && squeezed_info.pairs > 0);
     fine.fit_memory = 0;
@@ -181,10 +183,11 @@ int main() {
     blik_tally odd = alone.tally;
     odd.noise_squared = std::numeric_limits<double>::quiet_NaN();
     blik_report none_of_it{};
+    blik_report_init(&none_of_it);
     REQUIRE(blik_get_report(solution.get(), &odd, &told_why, &none_of_it) == BLIK_ERROR_RANGE);
     REQUIRE(told_why.field == BLIK_FIELD_TALLY && none_of_it.tolerance == 0.0);
     odd.chain_rays = UINT64_MAX;
-    blik_tally_add(&odd, &odd);
+    blik::add(odd, odd);
 
     // an exception of a callback stops the stage and comes out where the caller asks for it
     int caught = 0;

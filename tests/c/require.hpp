@@ -1,12 +1,13 @@
-// What the C++ programs here claim: the first condition that does not hold is told, and ends them.
+// Ends the program with 1 where a condition does not hold, and says which.
 #pragma once
 
 #include <cstdio>
+#include <cstdlib>
 
 #define REQUIRE(condition)                                                        \
     do {                                                                          \
         if (!(condition)) {                                                       \
             std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);  \
-            return 1;                                                             \
+            std::exit(1);                                                         \
         }                                                                         \
-    } while (false)
+    } while (0)

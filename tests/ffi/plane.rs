@@ -1,7 +1,6 @@
 //! The plane model through the C interface: the owning layer's results bit for bit, in the caller's memory and in its
 //! own, on one lane and on several; refused calls name what is wrong and write nothing.
 
-use super::init;
 use blik::*;
 use blik_kernel::plane::Vec2;
 use blik_kernel::plane::host::{self, Settings};
@@ -83,8 +82,8 @@ struct Arrays {
 
 impl Arrays {
     fn new() -> Arrays {
-        let material = init(blik_plane_material_init);
-        let circle = |x| blik_plane_body { centre: [x, 0.0], elements: 12, ..init(blik_plane_body_init) };
+        let material = blik_plane_material::default();
+        let circle = |x| blik_plane_body { centre: [x, 0.0], elements: 12, ..blik_plane_body::default() };
         let wedge = blik_plane_body {
             shape: BLIK_PLANE_POLYGON,
             smooth: 1,
@@ -92,7 +91,7 @@ impl Arrays {
             elements: 2,
             points: WEDGE.as_ptr().cast(),
             point_count: WEDGE.len(),
-            ..init(blik_plane_body_init)
+            ..blik_plane_body::default()
         };
         Arrays {
             materials: [
@@ -116,13 +115,13 @@ impl Arrays {
             body_count: self.bodies.len(),
             materials: self.materials.as_ptr(),
             material_count: self.materials.len(),
-            ..init(blik_plane_bodies_init)
+            ..blik_plane_bodies::default()
         }
     }
 }
 
 fn settings() -> blik_plane_settings {
-    blik_plane_settings { tolerance: 1e-3, ..init(blik_plane_settings_init) }
+    blik_plane_settings { tolerance: 1e-3, ..blik_plane_settings::default() }
 }
 
 /// Memory at an odd address, of any content.
@@ -147,7 +146,7 @@ fn interface(case: &Case, run: &blik_run, own: bool) -> (Vec<Seen>, [f64; 3]) {
     let arrays = Arrays::new();
     let (all, mut error) = (arrays.all(), blik_error::default());
     let settings = blik_plane_settings { max_bounces: case.bounces.map_or(-1, |b| b as i32), ..settings() };
-    let mut sky = blik_plane_sky { radiance: 1.5, ..init(blik_plane_sky_init) };
+    let mut sky = blik_plane_sky { radiance: 1.5, ..blik_plane_sky::default() };
     if case.varying {
         sky.radiance_of = Some(asked);
         (sky.jumps, sky.jump_count) = (JUMPS.as_ptr().cast(), JUMPS.len());
@@ -156,10 +155,10 @@ fn interface(case: &Case, run: &blik_run, own: bool) -> (Vec<Seen>, [f64; 3]) {
         direction: [1.0, 2.0],
         irradiance: 0.7,
         capture_half_angle: case.capture,
-        ..init(blik_plane_sun_init)
+        ..blik_plane_sun::default()
     };
     let sun = if case.sun { &raw const sun } else { null() };
-    let light = blik_plane_light { sky: &sky, sun, ..init(blik_plane_light_init) };
+    let light = blik_plane_light { sky: &sky, sun, ..blik_plane_light::default() };
     let mut bytes = 0;
     // SAFETY: all pointers are to values above; memory outlives the handles in it.
     unsafe {
@@ -174,7 +173,7 @@ fn interface(case: &Case, run: &blik_run, own: bool) -> (Vec<Seen>, [f64; 3]) {
             blik_plane_scene_destroy(scene);
             return seen;
         }
-        let (mut scene, mut coupling, mut solution) = (null(), null(), null());
+        let (mut scene, mut coupling, mut solution) = (null_mut(), null_mut(), null_mut());
         done(blik_plane_scene_size(&all, &mut error, &mut bytes), &error);
         let mut blocks = [Block::new(bytes), Block::new(0), Block::new(0), Block::new(0)];
         let memory = blocks[0].at();
@@ -211,14 +210,15 @@ unsafe fn views(
     let none = blik_plane_sample { abscissa: 0.0, radiance: -1.0, chain_tail: 0.0, rays: 0, object: 0 };
     let mut out = vec![none; SAMPLES];
     let (head, tail) = out.split_at_mut(40);
-    let mut info = std::mem::MaybeUninit::<blik_plane_solution_info>::uninit();
-    let mut rows = std::mem::MaybeUninit::<blik_plane_coupling_info>::uninit();
+    let mut info = blik_plane_solution_info::default();
+    let mut rows = blik_plane_coupling_info::default();
     // SAFETY: by the caller's promise, and as many samples as said.
-    let (info, rows) = unsafe {
+    unsafe {
         for (first, part) in [(0, head), (40, tail)] {
             let (count, to) = (part.len(), part.as_mut_ptr());
-            let status =
-                blik_plane_image(solution, ANGLE, SAMPLES, first, count, run, scratch, size, &mut error, to);
+            let status = blik_plane_image(
+                solution, ANGLE, SAMPLES, first, count, run, scratch, size, &mut error, to, count,
+            );
             done(status, &error);
         }
         // the same along rays of the caller's
@@ -232,16 +232,24 @@ unsafe fn views(
             .collect();
         let mut again = vec![none; SAMPLES];
         let to = again.as_mut_ptr();
-        let status =
-            blik_plane_radiance(solution, rays.as_ptr(), SAMPLES, run, scratch, size, &mut error, to);
+        let status = blik_plane_radiance(
+            solution,
+            rays.as_ptr(),
+            SAMPLES,
+            run,
+            scratch,
+            size,
+            &mut error,
+            to,
+            SAMPLES,
+        );
         done(status, &error);
         // the same lines, from elsewhere on them: a sample next to a silhouette may differ
         let near = |(a, b): (&blik_plane_sample, &blik_plane_sample)| (a.radiance - b.radiance).abs() < 1e-9;
         assert!(out.iter().zip(&again).filter(|pair| near(*pair)).count() >= SAMPLES - 3);
-        done(blik_plane_solution_get_info(solution, &mut error, info.as_mut_ptr()), &error);
-        done(blik_plane_coupling_get_info(coupling, &mut error, rows.as_mut_ptr()), &error);
-        (info.assume_init(), rows.assume_init())
-    };
+        done(blik_plane_solution_get_info(solution, &mut error, &mut info), &error);
+        done(blik_plane_coupling_get_info(coupling, &mut error, &mut rows), &error);
+    }
     let seen = |s: &blik_plane_sample| Seen {
         radiance: s.radiance,
         object: s.object == 1,
@@ -253,8 +261,8 @@ unsafe fn views(
 
 #[test]
 fn the_plane_model_has_the_owning_layers_bits() {
-    let three = blik_run { parallel: Some(blik_run_on_threads), lanes: 3, ..init(blik_run_init) };
-    let one = init(blik_run_init);
+    let three = blik_run { parallel: Some(blik_run_on_threads), lanes: 3, ..blik_run::default() };
+    let one = blik_run::default();
     let usual = Case { varying: false, sun: false, capture: 0.0, bounces: None };
     for case in [
         usual,
@@ -318,8 +326,8 @@ fn refused_plane_calls_name_what_is_wrong() {
 fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
     let arrays = Arrays::new();
     let (all, settings, mut error) = (arrays.all(), settings(), blik_error::default());
-    let mut sky = init(blik_plane_sky_init);
-    let mut light = blik_plane_light { sky: &sky, ..init(blik_plane_light_init) };
+    let mut sky = blik_plane_sky::default();
+    let mut light = blik_plane_light { sky: &sky, ..blik_plane_light::default() };
     let mut sample = blik_plane_sample { abscissa: 0.0, radiance: 0.0, chain_tail: 0.0, rays: 0, object: 0 };
     let (mut scene, mut coupling, mut solution) = (null_mut(), null_mut(), null_mut());
     // SAFETY: pointers are valid, or null.
@@ -330,11 +338,11 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
         light.sky = &sky;
         let status = blik_plane_solution_create(coupling, &light, null(), &mut error, &mut solution);
         assert!(status == BLIK_ERROR_RANGE && error.field == BLIK_FIELD_SKY_RADIANCE && solution.is_null());
-        sky = blik_plane_sky { jump_count: 13, ..init(blik_plane_sky_init) };
+        sky = blik_plane_sky { jump_count: 13, ..blik_plane_sky::default() };
         light.sky = &sky;
         let status = blik_plane_solution_create(coupling, &light, null(), &mut error, &mut solution);
         assert!(status == BLIK_ERROR_TOO_MANY && error.needed == 12 && error.given == 13);
-        sky = blik_plane_sky { radiance: -1.0, ..init(blik_plane_sky_init) };
+        sky = blik_plane_sky { radiance: -1.0, ..blik_plane_sky::default() };
         light.sky = &sky;
         let status = blik_plane_solution_create(coupling, &light, null(), &mut error, &mut solution);
         assert!(status == BLIK_ERROR_RANGE && error.field == BLIK_FIELD_SKY_RADIANCE);
@@ -354,6 +362,7 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
                 size,
                 &mut error,
                 &mut sample,
+                count,
             );
             (status, error.field)
         };
@@ -362,7 +371,8 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
         assert_eq!(image(0.0, 9, 9, 1, 0), (BLIK_ERROR_RANGE, BLIK_FIELD_ROWS));
         assert_eq!(image(0.0, 9, 0, 1, 8).0, BLIK_ERROR_BUFFER_TOO_SMALL);
         let ray = blik_plane_ray { origin: [0.0, 9.0], direction: [0.0, -2.0] };
-        let status = blik_plane_radiance(solution, &ray, 1, null(), null_mut(), 0, &mut error, &mut sample);
+        let status =
+            blik_plane_radiance(solution, &ray, 1, null(), null_mut(), 0, &mut error, &mut sample, 1);
         assert!(status == BLIK_ERROR_DIRECTION && error.index == 0);
         let status = blik_plane_image(
             coupling.cast_const().cast(),
@@ -375,6 +385,7 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
             0,
             &mut error,
             &mut sample,
+            1,
         );
         assert_eq!(status, BLIK_ERROR_HANDLE);
         // what a point sees fills its half circle; its circle is on none of the spans
@@ -394,21 +405,24 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
         // a circle of radius 1 seen from 1.6 off its centre
         assert!((circle.to - circle.from - 2.0 / 1.6).abs() < 1e-12);
         // the row's form factors and sky share add up: sky, and what diffuse and mirror surfaces leave
-        let mut info = std::mem::MaybeUninit::<blik_plane_scene_info>::uninit();
-        done(blik_plane_scene_get_info(scene, &mut error, info.as_mut_ptr()), &error);
-        let unknowns = info.assume_init().unknowns;
+        let mut info = blik_plane_scene_info::default();
+        done(blik_plane_scene_get_info(scene, &mut error, &mut info), &error);
+        let unknowns = info.unknowns;
         let (mut row, mut open) = (vec![0.0; unknowns], [0.0]);
         done(
-            blik_plane_coupling_get_rows(coupling, 5, 1, &mut error, row.as_mut_ptr(), open.as_mut_ptr()),
+            {
+                let (to, of_sky) = (row.as_mut_ptr(), open.as_mut_ptr());
+                blik_plane_coupling_get_rows(coupling, 5, 1, &mut error, to, unknowns, of_sky, 1)
+            },
             &error,
         );
         let sum: f64 = row.iter().sum::<f64>() + open[0];
         assert!(sum > 0.999 && sum < 1.4 && open[0] > 0.3, "{sum}");
         let status =
-            blik_plane_coupling_get_rows(coupling, unknowns, 1, &mut error, row.as_mut_ptr(), null_mut());
+            blik_plane_coupling_get_rows(coupling, unknowns, 1, &mut error, null_mut(), 0, null_mut(), 0);
         assert!(status == BLIK_ERROR_RANGE && error.field == BLIK_FIELD_ROWS);
         let mut place = std::mem::MaybeUninit::<blik_plane_unknown>::uninit();
-        done(blik_plane_get_unknowns(solution, 5, 1, &mut error, place.as_mut_ptr()), &error);
+        done(blik_plane_get_unknowns(solution, 5, 1, &mut error, place.as_mut_ptr(), 1), &error);
         let place = place.assume_init();
         assert!(place.primitive == 0 && place.radiance > 0.2 && place.radiance < 1.0);
         let rays = [
@@ -416,7 +430,7 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
             blik_plane_ray { origin: [-1.3, 5.0], direction: [0.0, 1.0] },
         ];
         let mut hits = [std::mem::zeroed::<blik_plane_hit>(); 2];
-        done(blik_plane_first_hits(scene, rays.as_ptr(), 2, &mut error, hits.as_mut_ptr()), &error);
+        done(blik_plane_first_hits(scene, rays.as_ptr(), 2, &mut error, hits.as_mut_ptr(), 2), &error);
         assert!(hits[0].primitive == 0 && hits[0].point == [-1.3, 1.0] && hits[1].primitive == BLIK_NO_FACET);
         blik_plane_solution_destroy(solution);
         blik_plane_coupling_destroy(coupling);
@@ -432,22 +446,22 @@ fn a_plane_sky_that_is_not_a_number_and_wrong_calls_are_refused() {
 /// The two methods of the paper, through the interface.
 #[test]
 fn the_papers_methods_are_those_of_the_owning_layer() {
-    let body = blik_plane_body { elements: 32, ..init(blik_plane_body_init) };
+    let body = blik_plane_body { elements: 32, ..blik_plane_body::default() };
     let bodies = [body, blik_plane_body { centre: [2.2, 0.0], ..body }];
-    let material = blik_plane_material { diffuse: 0.3, specular: 0.1, ..init(blik_plane_material_init) };
+    let material = blik_plane_material { diffuse: 0.3, specular: 0.1, ..blik_plane_material::default() };
     let all = blik_plane_bodies {
         bodies: bodies.as_ptr(),
         body_count: 2,
         materials: &material,
         material_count: 1,
-        ..init(blik_plane_bodies_init)
+        ..blik_plane_bodies::default()
     };
     let shape = |x| Shape::Circle { centre: [x, 0.0], radius: 1.0 };
     let inputs = [0.0, 2.2].map(|x| BodyInput { shape: shape(x), material: 0, elements: 32 });
     let materials = [PlaneMaterial { diffuse: 0.3, specular: 0.1, gloss: None }];
     let light = Light::new(Sky::Uniform(1.0), None).unwrap();
-    let sky = init(blik_plane_sky_init);
-    let given = blik_plane_light { sky: &sky, ..init(blik_plane_light_init) };
+    let sky = blik_plane_sky::default();
+    let given = blik_plane_light { sky: &sky, ..blik_plane_light::default() };
     for (basis, kernels) in [(BLIK_PLANE_CONSTANT, Basis::Constant), (BLIK_PLANE_LINEAR, Basis::Linear)] {
         let chosen = blik_plane_settings {
             basis,
@@ -475,7 +489,10 @@ fn the_papers_methods_are_those_of_the_owning_layer() {
             done(blik_plane_coupling_create(scene, null(), &mut error, &mut coupling), &error);
             done(blik_plane_solution_create(coupling, &given, null(), &mut error, &mut solution), &error);
             let mut out = vec![std::mem::zeroed::<blik_plane_unknown>(); expected.len()];
-            done(blik_plane_get_unknowns(solution, 0, out.len(), &mut error, out.as_mut_ptr()), &error);
+            done(
+                blik_plane_get_unknowns(solution, 0, out.len(), &mut error, out.as_mut_ptr(), out.len()),
+                &error,
+            );
             assert!(out.iter().map(|u| u.radiance).eq(expected));
             blik_plane_solution_destroy(solution);
             blik_plane_coupling_destroy(coupling);

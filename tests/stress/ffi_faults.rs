@@ -82,7 +82,7 @@ fn disturbed(fault: Fault, work: impl FnOnce(*const blik_run) -> i32) -> bool {
         Fault::Stop(calls) => (calls, BLIK_ERROR_CANCELLED),
     };
     let user = (&raw mut calls).cast();
-    let run = blik_run { progress: Some(stop), progress_user: user, ..init(blik_run_init) };
+    let run = blik_run { progress: Some(stop), progress_user: user, ..blik_run::default() };
     let status = work(&run);
     LEFT.set(u64::MAX);
     assert!(status == BLIK_OK || status == wanted, "status {status}, not {wanted}");
@@ -114,7 +114,7 @@ fn until_made<T>(
 fn pixels_in_spite_of(fault: fn(u32) -> Fault, scene_too: bool) -> Vec<u32> {
     let inputs = Inputs { gloss: [0.0, 9.0], ..Inputs::new() };
     let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
-    let mut settings = init(blik_settings_init);
+    let mut settings = blik_settings::default();
     settings.tolerance = inputs.tolerance;
     with_mesh(&inputs, |mesh| {
         // SAFETY: valid structs and handles throughout.

@@ -58,7 +58,7 @@ static void *take(size_t bytes)
     return place;
 }
 
-static void require(int32_t status)
+static void require(blik_status status)
 {
     if (status != BLIK_OK) {
         board_print(blik_status_text(status));
@@ -99,7 +99,7 @@ static uint32_t checksum(const void *data, size_t bytes)
 }
 
 #ifndef RENDER_SOLVED
-static void light(const blik_coupling *coupling, double toward, const blik_solution **solution)
+static void light(const blik_coupling *coupling, double toward, blik_solution **solution)
 {
     blik_error error;
     blik_sky sky;
@@ -139,7 +139,7 @@ static void show(const char *what, const blik_solution *solution)
     camera.rows = ROWS;
     require(blik_image_scratch_size(solution, &camera, NULL, &error, &bytes));
     scratch = take(bytes);
-    require(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, COLUMNS * ROWS, NULL, NULL));
+    require(blik_image(solution, &camera, NULL, scratch, bytes, &error, pixels, COLUMNS * ROWS, NULL, 0, NULL));
     used = before;
     say(what, checksum(pixels, sizeof pixels), "\n");
 }
@@ -171,7 +171,7 @@ static void signatures(const blik_solution *solution)
     watch_stack();
     require(blik_radiance_scratch_size(solution, NULL, &error, &bytes));
     scratch = take(bytes);
-    require(blik_signatures(solution, directions[0], 2, 0, NULL, scratch, bytes, &error, measured));
+    require(blik_signatures(solution, directions[0], 2, 0, NULL, scratch, bytes, &error, measured, 2, sizeof measured[0]));
     used = before;
     say("signatures", checksum(measured, sizeof measured), "\n");
 }
@@ -184,9 +184,9 @@ static const void *compute(size_t *bytes)
     blik_error error;
     blik_mesh mesh;
     blik_settings settings;
-    const blik_scene *scene = NULL;
-    const blik_coupling *coupling = NULL;
-    const blik_solution *solution = NULL;
+    blik_scene *scene = NULL;
+    blik_coupling *coupling = NULL;
+    blik_solution *solution = NULL;
     void *place;
     watch_stack();
     materials[0].diffuse = &grey;
@@ -220,6 +220,7 @@ static const void *compute(size_t *bytes)
     require(blik_coupling_init(scene, &settings, NULL, place, *bytes, &error, &coupling));
     {
         blik_coupling_info info;
+        blik_coupling_info_init(&info);
         require(blik_coupling_get_info(coupling, &error, &info));
         used -= (*bytes - info.bytes) / 64 * 64;
         say("coupling", (uint32_t)info.pairs, " form factors\n");
@@ -243,9 +244,9 @@ static const void *compute(size_t *bytes)
 static void render(const char *what, const void *block, size_t size)
 {
     blik_error error;
-    const blik_scene *scene = NULL;
-    const blik_coupling *coupling = NULL;
-    const blik_solution *solution = NULL;
+    blik_scene *scene = NULL;
+    blik_coupling *coupling = NULL;
+    blik_solution *solution = NULL;
     size_t bytes = 0, before = used;
     void *place;
     watch_stack();

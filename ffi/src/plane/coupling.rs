@@ -5,6 +5,7 @@ use super::{Lanes, lane_bytes, part};
 use crate::memory::*;
 use crate::run::{Runner, Start, blik_run};
 use crate::status::*;
+use crate::types::{Place, Sized_, sized};
 use crate::{call, caught};
 use blik_kernel::arena::{Arena, Need};
 use blik_kernel::plane::rows::{self, RowInfo};
@@ -41,6 +42,8 @@ impl Handle for blik_plane_coupling {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_coupling_info {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Unknowns: rows.
     pub unknowns: usize,
     /// Rows kept for each unknown: one for each number of reflections that is told apart.
@@ -54,6 +57,21 @@ pub struct blik_plane_coupling_info {
     /// Bytes in use.
     pub bytes: usize,
 }
+
+impl Default for blik_plane_coupling_info {
+    fn default() -> blik_plane_coupling_info {
+        blik_plane_coupling_info {
+            struct_size: size_of::<blik_plane_coupling_info>(),
+            unknowns: 0,
+            classes: 0,
+            coupled_rows: 0,
+            rays: 0,
+            dropped: 0.0,
+            bytes: 0,
+        }
+    }
+}
+sized!(blik_plane_coupling_info);
 
 /// Reflections told apart.
 pub(super) fn classes(base: &blik_plane_scene) -> usize {
@@ -107,6 +125,7 @@ fn build(
         Ok(rows::fill(scene, &settings, range, matrix, open, notes, scratch)?)
     })?;
     let info = blik_plane_coupling_info {
+        struct_size: size_of::<blik_plane_coupling_info>(),
         unknowns,
         classes,
         coupled_rows: notes.iter().map(|n| n.coupled as usize).sum(),
@@ -128,7 +147,10 @@ fn build(
     Ok(place.as_ptr())
 }
 
-/// Bytes of memory with which [`blik_plane_coupling_init`] keeps all lanes of `run` busy; less is for fewer lanes.
+/// Bytes of memory with which [`blik_plane_coupling_init`] keeps all lanes of `run` busy.
+///
+/// - `scene`: the scene
+/// - `bytes`: receives the bytes; less is for fewer lanes
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -138,7 +160,7 @@ pub unsafe extern "C" fn blik_plane_coupling_size(
     run: *const blik_run,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -150,8 +172,11 @@ pub unsafe extern "C" fn blik_plane_coupling_size(
     })
 }
 
-/// Computes the extended form factors of all unknowns of a plane scene, eq. (12), in the caller's memory: once for its
-/// bodies and materials, whatever the light. The scene must outlive the coupling.
+/// Computes the extended form factors of all unknowns of a plane scene in the caller's memory: once for its bodies and
+/// materials, whatever the light.
+///
+/// - `scene`: the scene, which must outlive the coupling
+/// - `coupling`: receives the coupling
 ///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the coupling is in use.
@@ -162,8 +187,8 @@ pub unsafe extern "C" fn blik_plane_coupling_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    coupling: *mut *const blik_plane_coupling,
-) -> i32 {
+    coupling: *mut *mut blik_plane_coupling,
+) -> blik_status {
     call(error, || {
         let to = needed(coupling)?;
         // SAFETY: by the caller's promise.
@@ -175,7 +200,10 @@ pub unsafe extern "C" fn blik_plane_coupling_init(
     })
 }
 
-/// As [`blik_plane_coupling_init`], in memory of its own; to be ended by [`blik_plane_coupling_destroy`].
+/// Computes the extended form factors of all unknowns of a plane scene in memory of its own.
+///
+/// - `scene`: the scene, which must outlive the coupling
+/// - `coupling`: receives the coupling; to be ended by [`blik_plane_coupling_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -186,7 +214,7 @@ pub unsafe extern "C" fn blik_plane_coupling_create(
     run: *const blik_run,
     error: *mut blik_error,
     coupling: *mut *mut blik_plane_coupling,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(coupling)?;
         // SAFETY: by the caller's promise.
@@ -203,7 +231,9 @@ pub unsafe extern "C" fn blik_plane_coupling_create(
     })
 }
 
-/// Ends a plane coupling and frees what it owns; nothing for null. Solutions made from it must have ended before.
+/// Ends a plane coupling and frees what it owns.
+///
+/// - `coupling`: the coupling, whose solutions have ended before; null: nothing
 ///
 /// # Safety
 /// Null or a coupling that nobody uses.
@@ -218,6 +248,9 @@ pub unsafe extern "C" fn blik_plane_coupling_destroy(coupling: *mut blik_plane_c
 
 /// Numbers of a plane coupling.
 ///
+/// - `coupling`: the coupling
+/// - `info`: receives them; its `struct_size` is set before
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -225,19 +258,24 @@ pub unsafe extern "C" fn blik_plane_coupling_get_info(
     coupling: *const blik_plane_coupling,
     error: *mut blik_error,
     info: *mut blik_plane_coupling_info,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(info)?;
         // SAFETY: by the caller's promise.
-        let handle = unsafe { object(coupling) }?;
-        // SAFETY: not null.
-        unsafe { to.write(handle.info) };
+        let (to, handle): (_, &blik_plane_coupling) = unsafe { (Place::new(info)?, object(coupling)?) };
+        to.write(handle.info);
         Ok(())
     })
 }
 
-/// Rows `first` .. `first + count`: to `factors` for each row and class the extended form factors toward all unknowns, to
-/// `open` for each row and class what shows the sky. Either may be null.
+/// Rows of extended form factors.
+///
+/// - `coupling`: the coupling
+/// - `first`: index of the first row
+/// - `count`: number of rows
+/// - `factors`: receives for each row and class the factors toward all unknowns; null: not wanted
+/// - `factor_count`: number of values that there is room for: `count` x classes x unknowns
+/// - `open`: receives for each row and class the share that shows the sky; null: not wanted
+/// - `open_count`: number of values that there is room for: `count` x classes
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -248,18 +286,20 @@ pub unsafe extern "C" fn blik_plane_coupling_get_rows(
     count: usize,
     error: *mut blik_error,
     factors: *mut f64,
+    factor_count: usize,
     open: *mut f64,
-) -> i32 {
+    open_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let handle = unsafe { object(coupling) }?;
+        let handle: &blik_plane_coupling = unsafe { object(coupling) }?;
         let range = crate::view::rows_of(first, count, handle.info.unknowns)?;
         let (unknowns, classes) = (handle.info.unknowns, handle.info.classes);
-        let of = |missing: bool, size: usize| if missing { 0 } else { size };
         // SAFETY: by the caller's promise.
         let (factors, open) = unsafe {
-            let factors = output(factors, of(factors.is_null(), count * classes * unknowns))?;
-            (factors, output(open, of(open.is_null(), count * classes))?)
+            let factors = (factors, factor_count);
+            let factors = optional_output(factors, count * classes * unknowns, BLIK_FIELD_FACTORS)?;
+            (factors, optional_output((open, open_count), count * classes, BLIK_FIELD_FACTORS)?)
         };
         let copy = |to: &mut [f64], from: &[f64], stride: usize| {
             to.iter_mut().zip(from.iter().skip(range.start * stride)).for_each(|(to, from)| *to = *from);

@@ -3,7 +3,7 @@
 use super::types::*;
 use crate::memory::*;
 use crate::status::*;
-use crate::types::read;
+use crate::types::{Place, Sized_, read, sized};
 use crate::{call, caught};
 use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::plane::Vec2;
@@ -39,6 +39,8 @@ impl Handle for blik_plane_scene {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_scene_info {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Bodies.
     pub bodies: usize,
     /// Circles and segments.
@@ -49,7 +51,15 @@ pub struct blik_plane_scene_info {
     pub bytes: usize,
 }
 
-/// A ray for blik_plane_first_hits and blik_plane_radiance.
+impl Default for blik_plane_scene_info {
+    fn default() -> blik_plane_scene_info {
+        let struct_size = size_of::<blik_plane_scene_info>();
+        blik_plane_scene_info { struct_size, bodies: 0, primitives: 0, unknowns: 0, bytes: 0 }
+    }
+}
+sized!(blik_plane_scene_info);
+
+/// A ray of the plane. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_ray {
@@ -59,7 +69,7 @@ pub struct blik_plane_ray {
     pub direction: [f64; 2],
 }
 
-/// Where a ray of the plane meets a body first.
+/// Where a ray of the plane meets a body first. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_hit {
@@ -231,6 +241,9 @@ fn table<T: Copy>(memory: &mut [u8], count: usize, value: T) -> Result<(&mut [T]
 
 /// Bytes of memory that [`blik_plane_scene_init`] needs for these bodies, at any address.
 ///
+/// - `bodies`: the bodies and materials
+/// - `bytes`: receives the bytes
+///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
 #[unsafe(no_mangle)]
@@ -238,7 +251,7 @@ pub unsafe extern "C" fn blik_plane_scene_size(
     bodies: *const blik_plane_bodies,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -251,6 +264,10 @@ pub unsafe extern "C" fn blik_plane_scene_size(
 
 /// Checks bodies and settings and makes a plane scene of them in the caller's memory.
 ///
+/// - `bodies`: the bodies and materials; not needed afterwards
+/// - `settings`: how they are solved
+/// - `scene`: receives the scene
+///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the scene is in use.
 #[unsafe(no_mangle)]
@@ -260,8 +277,8 @@ pub unsafe extern "C" fn blik_plane_scene_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    scene: *mut *const blik_plane_scene,
-) -> i32 {
+    scene: *mut *mut blik_plane_scene,
+) -> blik_status {
     call(error, || {
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
@@ -274,7 +291,11 @@ pub unsafe extern "C" fn blik_plane_scene_init(
     })
 }
 
-/// As [`blik_plane_scene_init`], in memory of its own; to be ended by [`blik_plane_scene_destroy`].
+/// Checks bodies and settings and makes a plane scene of them in memory of its own.
+///
+/// - `bodies`: the bodies and materials; not needed afterwards
+/// - `settings`: how they are solved
+/// - `scene`: receives the scene; to be ended by [`blik_plane_scene_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -285,7 +306,7 @@ pub unsafe extern "C" fn blik_plane_scene_create(
     settings: *const blik_plane_settings,
     error: *mut blik_error,
     scene: *mut *mut blik_plane_scene,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
@@ -302,7 +323,9 @@ pub unsafe extern "C" fn blik_plane_scene_create(
     })
 }
 
-/// Ends a plane scene and frees what it owns; nothing for null. Couplings made from it must have ended before.
+/// Ends a plane scene and frees what it owns.
+///
+/// - `scene`: the scene, whose couplings have ended before; null: nothing
 ///
 /// # Safety
 /// Null or a scene that nobody uses.
@@ -317,6 +340,9 @@ pub unsafe extern "C" fn blik_plane_scene_destroy(scene: *mut blik_plane_scene) 
 
 /// Numbers of a plane scene.
 ///
+/// - `scene`: the scene
+/// - `info`: receives them; its `struct_size` is set before
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -324,19 +350,17 @@ pub unsafe extern "C" fn blik_plane_scene_get_info(
     scene: *const blik_plane_scene,
     error: *mut blik_error,
     info: *mut blik_plane_scene_info,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(info)?;
         // SAFETY: by the caller's promise.
-        let handle = unsafe { object(scene) }?;
-        let info = blik_plane_scene_info {
+        let (to, handle): (_, &blik_plane_scene) = unsafe { (Place::new(info)?, object(scene)?) };
+        to.write(blik_plane_scene_info {
             bodies: handle.scene.bodies().len(),
             primitives: handle.scene.primitives().len(),
             unknowns: handle.scene.unknowns(),
             bytes: handle.bytes,
-        };
-        // SAFETY: not null.
-        unsafe { to.write(info) };
+            ..blik_plane_scene_info::default()
+        });
         Ok(())
     })
 }
@@ -348,10 +372,16 @@ pub(super) fn ray(ray: &blik_plane_ray, index: usize) -> Result<(Vec2, Vec2), bl
     if origin.is_finite() && (-1e-6..=1e-6).contains(&off) {
         return Ok((origin, direction));
     }
-    Err(blik_error { index, ..blik_error::of(BLIK_ERROR_DIRECTION).field(BLIK_FIELD_DIRECTION) })
+    Err(blik_error { index, ..blik_error::of(BLIK_ERROR_DIRECTION).field(BLIK_FIELD_RAY_DIRECTION) })
 }
 
-/// The first circle or segment that each of `count` rays meets.
+/// The first circle or segment that each ray meets.
+///
+/// - `scene`: the scene
+/// - `rays`: the rays; one that is not finite or of no unit direction is refused with its index
+/// - `count`: number of rays
+/// - `hits`: receives one hit a ray
+/// - `hit_count`: number of hits that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid; `rays` and `hits` have `count` entries.
@@ -362,10 +392,13 @@ pub unsafe extern "C" fn blik_plane_first_hits(
     count: usize,
     error: *mut blik_error,
     hits: *mut blik_plane_hit,
-) -> i32 {
+    hit_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let (handle, rays, out) = unsafe { (object(scene)?, input(rays, count)?, output(hits, count)?) };
+        let (handle, rays, out): (&blik_plane_scene, _, _) = unsafe {
+            (object(scene)?, input(rays, count)?, output_of((hits, hit_count), count, BLIK_FIELD_HITS)?)
+        };
         rays.iter().enumerate().try_for_each(|(index, ray)| self::ray(ray, index).map(|_| ()))?;
         for (index, (ray, out)) in rays.iter().zip(out).enumerate() {
             let (origin, direction) = self::ray(ray, index)?;

@@ -6,7 +6,7 @@ use super::{Lanes, lane_bytes, part};
 use crate::memory::*;
 use crate::run::{Runner, Start, blik_run};
 use crate::status::*;
-use crate::types::read;
+use crate::types::{Place, Sized_, read, sized};
 use crate::{call, caught};
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::plane::Vec2;
@@ -279,6 +279,8 @@ fn reflects(coupling: &blik_plane_coupling, unknown: usize) -> bool {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_solution_info {
+    /// Size of this struct.
+    pub struct_size: usize,
     /// Contraction of a sweep over the linear system.
     pub contraction: f64,
     /// Bound on the solver's error of all radiances: certain where the contraction is below 1, else by the sweeps' decay.
@@ -289,7 +291,19 @@ pub struct blik_plane_solution_info {
     pub bytes: usize,
 }
 
-/// Bytes of memory with which [`blik_plane_solution_init`] keeps all lanes of `run` busy; less is for fewer lanes.
+impl Default for blik_plane_solution_info {
+    fn default() -> blik_plane_solution_info {
+        let struct_size = size_of::<blik_plane_solution_info>();
+        blik_plane_solution_info { struct_size, contraction: 0.0, solver_error: 0.0, sweeps: 0, bytes: 0 }
+    }
+}
+sized!(blik_plane_solution_info);
+
+/// Bytes of memory with which [`blik_plane_solution_init`] keeps all lanes of `run` busy.
+///
+/// - `coupling`: the coupling
+/// - `light`: the light
+/// - `bytes`: receives the bytes; less is for fewer lanes
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -300,7 +314,7 @@ pub unsafe extern "C" fn blik_plane_solution_size(
     run: *const blik_run,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -312,9 +326,12 @@ pub unsafe extern "C" fn blik_plane_solution_size(
     })
 }
 
-/// Lights a plane scene and solves for its diffuse radiance in the caller's memory. The coupling must outlive the solution,
-/// and so must the sky's function, which must return finite values from 0 to 1e37: a solution whose sky ever returned
-/// another refuses that call and all later ones.
+/// Lights a plane scene and solves for its diffuse radiance in the caller's memory. A solution whose sky ever returned what
+/// is not finite, below 0 or above 1e37 refuses that call and all later ones.
+///
+/// - `coupling`: the coupling, which must outlive the solution
+/// - `light`: the light, whose sky's function must outlive the solution
+/// - `solution`: receives the solution
 ///
 /// # Safety
 /// Pointers are null or valid; nobody else uses the memory while the solution is in use.
@@ -326,8 +343,8 @@ pub unsafe extern "C" fn blik_plane_solution_init(
     memory: *mut c_void,
     size: usize,
     error: *mut blik_error,
-    solution: *mut *const blik_plane_solution,
-) -> i32 {
+    solution: *mut *mut blik_plane_solution,
+) -> blik_status {
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
@@ -340,7 +357,11 @@ pub unsafe extern "C" fn blik_plane_solution_init(
     })
 }
 
-/// As [`blik_plane_solution_init`], in memory of its own; to be ended by [`blik_plane_solution_destroy`].
+/// Lights a plane scene and solves for its diffuse radiance in memory of its own.
+///
+/// - `coupling`: the coupling, which must outlive the solution
+/// - `light`: the light, whose sky's function must outlive the solution
+/// - `solution`: receives the solution; to be ended by [`blik_plane_solution_destroy`]
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as the structs say.
@@ -352,7 +373,7 @@ pub unsafe extern "C" fn blik_plane_solution_create(
     run: *const blik_run,
     error: *mut blik_error,
     solution: *mut *mut blik_plane_solution,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
@@ -370,7 +391,9 @@ pub unsafe extern "C" fn blik_plane_solution_create(
     })
 }
 
-/// Ends a plane solution and frees what it owns; nothing for null.
+/// Ends a plane solution and frees what it owns.
+///
+/// - `solution`: the solution; null: nothing
 ///
 /// # Safety
 /// Null or a solution that nobody uses.
@@ -385,6 +408,9 @@ pub unsafe extern "C" fn blik_plane_solution_destroy(solution: *mut blik_plane_s
 
 /// Numbers of a plane solution.
 ///
+/// - `solution`: the solution
+/// - `info`: receives them; its `struct_size` is set before
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -392,19 +418,17 @@ pub unsafe extern "C" fn blik_plane_solution_get_info(
     solution: *const blik_plane_solution,
     error: *mut blik_error,
     info: *mut blik_plane_solution_info,
-) -> i32 {
+) -> blik_status {
     call(error, || {
-        let to = needed(info)?;
         // SAFETY: by the caller's promise.
-        let handle = unsafe { object(solution) }?;
-        let info = blik_plane_solution_info {
+        let (to, handle): (_, &blik_plane_solution) = unsafe { (Place::new(info)?, object(solution)?) };
+        to.write(blik_plane_solution_info {
             contraction: handle.relaxed.contraction,
             solver_error: handle.relaxed.error,
             sweeps: handle.relaxed.sweeps,
             bytes: handle.bytes,
-        };
-        // SAFETY: not null.
-        unsafe { to.write(info) };
+            ..blik_plane_solution_info::default()
+        });
         Ok(())
     })
 }

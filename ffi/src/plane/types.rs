@@ -1,7 +1,7 @@
 //! What callers hand over.
 
 use crate::status::*;
-use crate::types::{Sized_, read, set, sized};
+use crate::types::{Sized_, read, sized};
 use blik_kernel::plane::rows::Method;
 use blik_kernel::plane::scene::{Basis, PlaneGloss, PlaneMaterial, RaySet};
 use blik_kernel::plane::settings::Settings;
@@ -9,20 +9,23 @@ use blik_kernel::plane::stencil::MAX_ORDER;
 use core::ffi::c_void;
 use core::ptr::{null, null_mut};
 
-/// [`blik_plane_material`]: the rays that the tolerance needs.
+/// How rays stand for the lobe of a [`blik_plane_material`].
+pub type blik_plane_ray_set = i32;
+
+/// The rays that the tolerance needs.
 pub const BLIK_PLANE_RAYS_AUTO: i32 = 0;
-/// [`blik_plane_material`]: three rays as eq. (18) has them; those below the surface are lost.
+/// Three rays as in the paper; those below the surface are lost.
 pub const BLIK_PLANE_RAYS_PAPER: i32 = 1;
-/// [`blik_plane_material`]: three rays, of which those above the surface share the lobe's albedo.
+/// Three rays, of which those above the surface share the lobe's albedo.
 pub const BLIK_PLANE_RAYS_RENORMALISED: i32 = 2;
-/// [`blik_plane_material`]: Gauss nodes in the visible lobe's energy.
+/// Gauss nodes in the visible lobe's energy.
 pub const BLIK_PLANE_RAYS_GAUSS: i32 = 3;
-/// [`blik_plane_material`]: midpoints of equal shares of the visible lobe's energy.
+/// Midpoints of equal shares of the visible lobe's energy.
 pub const BLIK_PLANE_RAYS_EQUAL: i32 = 4;
-/// [`blik_plane_material`]: Gauss nodes in each part of the lobe between silhouettes.
+/// Gauss nodes in each part of the lobe between silhouettes.
 pub const BLIK_PLANE_RAYS_SPLIT: i32 = 5;
 
-/// Reflectances of a body of the plane model. Set by [`blik_plane_material_init`] first.
+/// Reflectances of a body of the plane model. Arrays of it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_material {
@@ -34,27 +37,30 @@ pub struct blik_plane_material {
     pub gloss_axis_ratio: f64,
     /// Full angle between the side rays of the paper's three, radians, 0 to 3.2.
     pub spacing: f64,
-    /// `BLIK_PLANE_RAYS_*`: how rays stand for the lobe; default AUTO.
-    pub ray_set: i32,
+    /// How rays stand for the lobe; default AUTO.
+    pub ray_set: blik_plane_ray_set,
     /// Rays of GAUSS, EQUAL and SPLIT at the first lobe of a path, at the second, and later: 1 to 4096.
     pub rays: [u32; 3],
 }
 
-/// [`blik_plane_body`]: a circle, seen from outside.
+/// Shape of a [`blik_plane_body`].
+pub type blik_plane_shape = i32;
+
+/// A circle, seen from outside.
 pub const BLIK_PLANE_CIRCLE: i32 = 0;
-/// [`blik_plane_body`]: straight segments from point to point.
+/// Straight segments from point to point.
 pub const BLIK_PLANE_POLYLINE: i32 = 1;
-/// [`blik_plane_body`]: straight segments, the last of which joins the first point.
+/// Straight segments, the last of which joins the first point.
 pub const BLIK_PLANE_POLYGON: i32 = 2;
 
 /// A body of the plane model: a circle, or segments whose fronts are on the right of their direction (counter-clockwise
-/// for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners. Set
-/// by [`blik_plane_body_init`] first.
+/// for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners. Arrays of
+/// it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_body {
-    /// `BLIK_PLANE_*`; default a circle.
-    pub shape: i32,
+    /// Circle (default), polyline or polygon.
+    pub shape: blik_plane_shape,
     /// Not 0: the segments stand for a smooth curve, whose normals and radiance are interpolated; default 0.
     pub smooth: i32,
     /// Index of the material; default 0.
@@ -71,11 +77,11 @@ pub struct blik_plane_body {
     pub point_count: usize,
 }
 
-/// What a plane scene is made of. Set by [`blik_plane_bodies_init`] first. Read during the call only.
+/// What a plane scene is made of. Read during the call only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_bodies {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// The bodies, at least one.
     pub bodies: *const blik_plane_body,
@@ -105,11 +111,11 @@ pub const BLIK_PLANE_FACETS: i32 = 1;
 /// `method` of [`blik_plane_settings`]: the half circle is split where chains change, each part with `points` nodes.
 pub const BLIK_PLANE_SPLIT: i32 = 2;
 
-/// How a plane scene is solved. Set by [`blik_plane_settings_init`] first: all but the tolerance follows from it.
+/// How a plane scene is solved. All but the tolerance follows from it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_settings {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Wanted error relative to the sky, 1e-13 to 0.1, on bodies that are cut finely enough (a circle of 12 elements at
     /// 1e-4, 16 at 1e-5); default 1e-4.
@@ -138,11 +144,11 @@ pub type blik_plane_radiance_of = Option<unsafe extern "C" fn(user: *mut c_void,
 /// Most jumps of a plane sky.
 pub const BLIK_PLANE_MAX_JUMPS: usize = 12;
 
-/// The sky of a plane scene. Set by [`blik_plane_sky_init`] first.
+/// The sky of a plane scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_sky {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Radiance from everywhere where `radiance_of` is null; default 1.
     pub radiance: f64,
@@ -156,11 +162,11 @@ pub struct blik_plane_sky {
     pub jump_count: usize,
 }
 
-/// A point sun of a plane scene. Set by [`blik_plane_sun_init`] first.
+/// A point sun of a plane scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_sun {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// Toward the sun, of any length but zero; default (0, 1).
     pub direction: [f64; 2],
@@ -173,11 +179,11 @@ pub struct blik_plane_sun {
     pub capture_radiance: f64,
 }
 
-/// The light of a plane scene. Set by [`blik_plane_light_init`] first. Read during the call only.
+/// The light of a plane scene. Read during the call only.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_light {
-    /// Set by the init function.
+    /// Size of this struct.
     pub struct_size: usize,
     /// The sky; null (default): none.
     pub sky: *const blik_plane_sky,
@@ -185,128 +191,93 @@ pub struct blik_plane_light {
     pub sun: *const blik_plane_sun,
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `material` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_material_init(material: *mut blik_plane_material) {
-    let value = blik_plane_material {
-        diffuse: 0.0,
-        specular: 0.0,
-        gloss_axis_ratio: 0.0,
-        spacing: 0.0,
-        ray_set: BLIK_PLANE_RAYS_AUTO,
-        rays: [0; 3],
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(material, value) };
+impl Default for blik_plane_material {
+    fn default() -> blik_plane_material {
+        blik_plane_material {
+            diffuse: 0.0,
+            specular: 0.0,
+            gloss_axis_ratio: 0.0,
+            spacing: 0.0,
+            ray_set: BLIK_PLANE_RAYS_AUTO,
+            rays: [0; 3],
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `body` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_body_init(body: *mut blik_plane_body) {
-    let value = blik_plane_body {
-        shape: BLIK_PLANE_CIRCLE,
-        smooth: 0,
-        material: 0,
-        elements: 1,
-        centre: [0.0; 2],
-        radius: 1.0,
-        points: null(),
-        point_count: 0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(body, value) };
+impl Default for blik_plane_body {
+    fn default() -> blik_plane_body {
+        blik_plane_body {
+            shape: BLIK_PLANE_CIRCLE,
+            smooth: 0,
+            material: 0,
+            elements: 1,
+            centre: [0.0; 2],
+            radius: 1.0,
+            points: null(),
+            point_count: 0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `bodies` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_bodies_init(bodies: *mut blik_plane_bodies) {
-    let value = blik_plane_bodies {
-        struct_size: size_of::<blik_plane_bodies>(),
-        bodies: null(),
-        body_count: 0,
-        body_stride: size_of::<blik_plane_body>(),
-        materials: null(),
-        material_count: 0,
-        material_stride: size_of::<blik_plane_material>(),
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(bodies, value) };
+impl Default for blik_plane_bodies {
+    fn default() -> blik_plane_bodies {
+        blik_plane_bodies {
+            struct_size: size_of::<blik_plane_bodies>(),
+            bodies: null(),
+            body_count: 0,
+            body_stride: size_of::<blik_plane_body>(),
+            materials: null(),
+            material_count: 0,
+            material_stride: size_of::<blik_plane_material>(),
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `settings` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_settings_init(settings: *mut blik_plane_settings) {
-    let value = blik_plane_settings {
-        struct_size: size_of::<blik_plane_settings>(),
-        tolerance: 1e-4,
-        basis: BLIK_PLANE_AUTO,
-        order: 0,
-        method: BLIK_PLANE_AUTO,
-        points: 0,
-        max_bounces: -1,
-        cutoff: -1.0,
-        solver: -1.0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(settings, value) };
+impl Default for blik_plane_settings {
+    fn default() -> blik_plane_settings {
+        blik_plane_settings {
+            struct_size: size_of::<blik_plane_settings>(),
+            tolerance: 1e-4,
+            basis: BLIK_PLANE_AUTO,
+            order: 0,
+            method: BLIK_PLANE_AUTO,
+            points: 0,
+            max_bounces: -1,
+            cutoff: -1.0,
+            solver: -1.0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `sky` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_sky_init(sky: *mut blik_plane_sky) {
-    let value = blik_plane_sky {
-        struct_size: size_of::<blik_plane_sky>(),
-        radiance: 1.0,
-        radiance_of: None,
-        user: null_mut(),
-        jumps: null(),
-        jump_count: 0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(sky, value) };
+impl Default for blik_plane_sky {
+    fn default() -> blik_plane_sky {
+        blik_plane_sky {
+            struct_size: size_of::<blik_plane_sky>(),
+            radiance: 1.0,
+            radiance_of: None,
+            user: null_mut(),
+            jumps: null(),
+            jump_count: 0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `sun` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_sun_init(sun: *mut blik_plane_sun) {
-    let value = blik_plane_sun {
-        struct_size: size_of::<blik_plane_sun>(),
-        direction: [0.0, 1.0],
-        irradiance: 2.0,
-        capture_half_angle: 0.0,
-        capture_radiance: -1.0,
-    };
-    // SAFETY: by the caller's promise.
-    unsafe { set(sun, value) };
+impl Default for blik_plane_sun {
+    fn default() -> blik_plane_sun {
+        blik_plane_sun {
+            struct_size: size_of::<blik_plane_sun>(),
+            direction: [0.0, 1.0],
+            irradiance: 2.0,
+            capture_half_angle: 0.0,
+            capture_radiance: -1.0,
+        }
+    }
 }
 
-/// Sets the defaults; does nothing with a null pointer.
-///
-/// # Safety
-/// `light` points to memory for one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn blik_plane_light_init(light: *mut blik_plane_light) {
-    let value = blik_plane_light { struct_size: size_of::<blik_plane_light>(), sky: null(), sun: null() };
-    // SAFETY: by the caller's promise.
-    unsafe { set(light, value) };
+impl Default for blik_plane_light {
+    fn default() -> blik_plane_light {
+        blik_plane_light { struct_size: size_of::<blik_plane_light>(), sky: null(), sun: null() }
+    }
 }
 
 impl blik_plane_material {

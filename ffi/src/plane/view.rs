@@ -16,7 +16,7 @@ use blik_kernel::plane::scratch::{Scratch, sweep};
 use blik_kernel::plane::view::Span;
 use core::ffi::c_void;
 
-/// What a ray of the plane brings.
+/// What a ray of the plane brings. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_sample {
@@ -34,6 +34,9 @@ pub struct blik_plane_sample {
 
 /// Bytes of scratch memory with which [`blik_plane_image`] and [`blik_plane_radiance`] keep all lanes of `run` busy.
 ///
+/// - `solution`: the solution
+/// - `bytes`: receives the bytes; less is for fewer lanes
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -42,7 +45,7 @@ pub unsafe extern "C" fn blik_plane_scratch_size(
     run: *const blik_run,
     error: *mut blik_error,
     bytes: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
@@ -90,12 +93,16 @@ fn trace(
     handle.check_sky()
 }
 
-/// Samples `first` .. `first + count` of the orthographic image of a plane scene with `samples` across, seen from the
-/// direction (sin `angle`, cos `angle`): samples are the centres of equal cells over the object's projection. However an
-/// image is split into calls, its bits are the same.
+/// Samples of the orthographic image of a plane scene: the centres of equal cells over the object's projection. However an
+/// image is split into calls, its bits are the same. A call that is cancelled leaves part of them written.
 ///
-/// `scratch` is memory of [`blik_plane_scratch_size`] bytes, or less, for fewer lanes; with the standard library it may be
-/// null, and is then taken from the heap. A call that is cancelled leaves part of the samples written.
+/// - `solution`: the solution
+/// - `angle`: where it is seen from: the direction (sin `angle`, cos `angle`)
+/// - `samples`: samples across the whole image
+/// - `first`: index of the first sample wanted
+/// - `count`: number of samples wanted
+/// - `out`: receives the samples
+/// - `out_count`: number of samples that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -111,7 +118,8 @@ pub unsafe extern "C" fn blik_plane_image(
     scratch_size: usize,
     error: *mut blik_error,
     out: *mut blik_plane_sample,
-) -> i32 {
+    out_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (handle, mut runner) = unsafe { (object(solution)?, Runner::new(run)?) };
@@ -119,7 +127,10 @@ pub unsafe extern "C" fn blik_plane_image(
         rows_of(first, count, samples)?;
         // SAFETY: by the caller's promise.
         let (out, mut scratch) = unsafe {
-            (output(out, count)?, Scratchpad::new(scratch, scratch_size, wanted(handle, &runner)?)?)
+            (
+                output_of((out, out_count), count, BLIK_FIELD_SAMPLES)?,
+                Scratchpad::new(scratch, scratch_size, wanted(handle, &runner)?)?,
+            )
         };
         trace(handle, scratch.bytes(), &mut runner, out, &|index| {
             let abscissa = view.abscissa(first + index);
@@ -129,7 +140,13 @@ pub unsafe extern "C" fn blik_plane_image(
     })
 }
 
-/// Radiance against each of `count` rays, which start on no body. Scratch memory as for [`blik_plane_image`].
+/// Radiance against rays.
+///
+/// - `solution`: the solution
+/// - `rays`: the rays, as for [`blik_plane_first_hits`], which start on no body
+/// - `count`: number of rays
+/// - `out`: receives one sample a ray
+/// - `out_count`: number of samples that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -143,14 +160,15 @@ pub unsafe extern "C" fn blik_plane_radiance(
     scratch_size: usize,
     error: *mut blik_error,
     out: *mut blik_plane_sample,
-) -> i32 {
+    out_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let (handle, mut runner) = unsafe { (object(solution)?, Runner::new(run)?) };
         // SAFETY: by the caller's promise.
         let (rays, out, mut scratch) = unsafe {
             let scratch = Scratchpad::new(scratch, scratch_size, wanted(handle, &runner)?)?;
-            (input(rays, count)?, output(out, count)?, scratch)
+            (input(rays, count)?, output_of((out, out_count), count, BLIK_FIELD_SAMPLES)?, scratch)
         };
         rays.iter().enumerate().try_for_each(|(index, one)| ray(one, index).map(|_| ()))?;
         let none = blik_error::of(BLIK_ERROR_INTERNAL);
@@ -161,7 +179,7 @@ pub unsafe extern "C" fn blik_plane_radiance(
     })
 }
 
-/// An unknown of a plane solution.
+/// An unknown of a plane solution. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_unknown {
@@ -175,7 +193,13 @@ pub struct blik_plane_unknown {
     pub primitive: u32,
 }
 
-/// Unknowns `first` .. `first + count` of a plane solution.
+/// Unknowns of a plane solution.
+///
+/// - `solution`: the solution
+/// - `first`: index of the first unknown
+/// - `count`: number of unknowns
+/// - `unknowns`: receives the unknowns
+/// - `unknown_count`: number of unknowns that there is room for: `count`
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -186,14 +210,15 @@ pub unsafe extern "C" fn blik_plane_get_unknowns(
     count: usize,
     error: *mut blik_error,
     unknowns: *mut blik_plane_unknown,
-) -> i32 {
+    unknown_count: usize,
+) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
         let handle = unsafe { object(solution) }?;
         let scene = &handle.coupling.base.scene;
         let range = rows_of(first, count, scene.unknowns())?;
         // SAFETY: by the caller's promise.
-        let out = unsafe { output(unknowns, count) }?;
+        let out = unsafe { output_of((unknowns, unknown_count), count, BLIK_FIELD_SAMPLES) }?;
         for (out, unknown) in out.iter_mut().zip(range) {
             let (primitive, v) = scene.unknown(unknown);
             let place = scene.place(primitive, v);
@@ -208,7 +233,7 @@ pub unsafe extern "C" fn blik_plane_get_unknowns(
     })
 }
 
-/// A part of what a point of the plane sees.
+/// A part of what a point of the plane sees. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_span {
@@ -222,6 +247,10 @@ pub struct blik_plane_span {
 
 /// Bytes of scratch memory for [`blik_plane_visible`], and the most spans that it finds.
 ///
+/// - `scene`: the scene
+/// - `bytes`: receives the bytes
+/// - `most_spans`: receives the number of spans
+///
 /// # Safety
 /// Pointers are null or valid.
 #[unsafe(no_mangle)]
@@ -230,7 +259,7 @@ pub unsafe extern "C" fn blik_plane_visible_size(
     error: *mut blik_error,
     bytes: *mut usize,
     most_spans: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let (to, most) = (needed(bytes)?, needed(most_spans)?);
         // SAFETY: by the caller's promise.
@@ -245,9 +274,15 @@ pub unsafe extern "C" fn blik_plane_visible_size(
     })
 }
 
-/// What a point with a normal (of any length but zero) sees of a plane scene, split at every silhouette: spans in the order
-/// of rising sines. `skip` is the circle or segment on which the point is, or `BLIK_NO_FACET`. `capacity` entries of
-/// `spans` are there; more are an error that tells how many.
+/// What a point sees of a plane scene, split at every silhouette.
+///
+/// - `scene`: the scene
+/// - `point`: two numbers
+/// - `normal`: two numbers, of any length but zero
+/// - `skip`: the circle or segment on which the point is, or `BLIK_NO_FACET`
+/// - `spans`: receives the spans, in the order of rising sines
+/// - `capacity`: number of spans that there is room for; more are an error that tells how many
+/// - `count`: receives the number of spans
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated; `point` and `normal` have two numbers.
@@ -263,7 +298,7 @@ pub unsafe extern "C" fn blik_plane_visible(
     spans: *mut blik_plane_span,
     capacity: usize,
     count: *mut usize,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(count)?;
         // SAFETY: by the caller's promise.
@@ -302,7 +337,7 @@ unsafe fn vector(at: *const f64) -> Result<Vec2, blik_error> {
     numbers.first_chunk().copied().map(Vec2::from_array).ok_or(blik_error::of(BLIK_ERROR_INTERNAL))
 }
 
-/// Closed forms of the lobe in the plane, for a specular reflectance of 1.
+/// Closed forms of the lobe in the plane, for a specular reflectance of 1. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_lobe {
@@ -310,16 +345,20 @@ pub struct blik_plane_lobe {
     pub albedo: f64,
     /// Its value per radian at the angle from the mirror direction.
     pub value: f64,
-    /// Width of a top hat of its peak and visible energy, radians, eq. (19).
+    /// Width of a top hat of its peak and visible energy, radians.
     pub equivalent_width: f64,
-    /// Mean of the albedo over the angle of incidence, eq. (17).
+    /// Mean of the albedo over the angle of incidence.
     pub mean_albedo: f64,
     /// Mean of the albedo weighed by the cosine.
     pub cosine_mean_albedo: f64,
 }
 
-/// The lobe of a glossy material of the plane, seen at an angle to the normal of cosine `cos_view` in [0, 1], at `off`
-/// radians from the mirror direction.
+/// The lobe of a glossy material of the plane.
+///
+/// - `gloss_axis_ratio`: long over short axis of the lobe, 1 or more
+/// - `cos_view`: cosine of the angle between view and normal, 0 to 1
+/// - `off`: angle from the mirror direction in radians
+/// - `lobe`: receives the closed forms
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -330,7 +369,7 @@ pub unsafe extern "C" fn blik_plane_gloss(
     off: f64,
     error: *mut blik_error,
     lobe: *mut blik_plane_lobe,
-) -> i32 {
+) -> blik_status {
     call(error, || {
         let to = needed(lobe)?;
         let own = PlaneLobe::new(gloss_axis_ratio)?;
