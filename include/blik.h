@@ -221,13 +221,13 @@ BLIK_API size_t blik_error_text(const blik_error *error, char *text, size_t size
 
 /* The words for a status: never null, never to be freed.
  *
- *   status  the status */
-BLIK_API const char *blik_status_text(blik_status status);
+ *   status  a blik_status, as the number that it is */
+BLIK_API const char *blik_status_text(int32_t status);
 
 /* The name of a field as the structs spell it: never null, never to be freed; empty for no field.
  *
- *   field  the field */
-BLIK_API const char *blik_field_text(blik_field field);
+ *   field  a blik_field, as the number that it is */
+BLIK_API const char *blik_field_text(int32_t field);
 
 /* ---- Threads and progress: optional ------------------------------------------------------------------------------ */
 

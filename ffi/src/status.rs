@@ -500,16 +500,16 @@ fn number(field: Field) -> i32 {
 
 /// The words for a status: never null, never to be freed.
 ///
-/// - `status`: the status
+/// - `status`: a `blik_status`, as the number that it is
 #[unsafe(no_mangle)]
-pub extern "C" fn blik_status_text(status: blik_status) -> *const c_char {
+pub extern "C" fn blik_status_text(status: i32) -> *const c_char {
     status_text(status).as_ptr()
 }
 
 /// The name of a field as the structs spell it: never null, never to be freed; empty for no field.
 ///
-/// - `field`: the field
+/// - `field`: a `blik_field`, as the number that it is
 #[unsafe(no_mangle)]
-pub extern "C" fn blik_field_text(field: blik_field) -> *const c_char {
+pub extern "C" fn blik_field_text(field: i32) -> *const c_char {
     field_text(field).as_ptr()
 }
