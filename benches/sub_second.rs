@@ -25,8 +25,14 @@ mod progress;
 mod report_file;
 #[path = "../kernel/examples/render/scene_file/mod.rs"]
 mod scene_file;
-#[path = "../kernel/examples/render/sky_table.rs"]
+#[path = "../kernel/examples/render/sky_table/mod.rs"]
 mod sky_table;
+#[allow(dead_code)]
+#[path = "../kernel/examples/render/text_file.rs"]
+mod text_file;
+#[allow(dead_code)]
+#[path = "../kernel/examples/render/view.rs"]
+mod view;
 
 use pipeline::{Job, Rendered};
 use scene_file::Scene;

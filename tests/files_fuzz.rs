@@ -13,9 +13,11 @@ mod mesh_file;
 #[path = "../kernel/examples/render/scene_file/mod.rs"]
 mod scene_file;
 #[allow(dead_code)]
-#[path = "../kernel/examples/render/sky_table.rs"]
+#[path = "../kernel/examples/render/sky_table/mod.rs"]
 mod sky_table;
 mod support;
+#[path = "../kernel/examples/render/text_file.rs"]
+mod text_file;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -167,7 +169,7 @@ fn damaged_mesh_files_are_read_or_refused() {
 
 #[test]
 fn damaged_sky_tables_are_read_or_refused() {
-    fuzz("sky tables", &["npy", "pfm"], 12_000, |path| {
-        sky_table::read(path, 1).map(drop).map_err(|e| e.to_string())
+    fuzz("sky tables", &["npy", "pfm", "hdr"], 12_000, |path| {
+        sky_table::read(path, 3, None).map(drop).map_err(|e| e.to_string())
     });
 }

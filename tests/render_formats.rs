@@ -5,7 +5,10 @@
 #[allow(dead_code)]
 mod failure;
 #[path = "../kernel/examples/render/mesh_file/mod.rs"]
+#[allow(dead_code)]
 mod mesh_file;
+#[path = "../kernel/examples/render/text_file.rs"]
+mod text_file;
 
 use base64::Engine;
 use mesh_file::{Mesh, NO_NORMAL};
@@ -167,9 +170,11 @@ fn ply_is_read_in_all_encodings() {
     // What is declared as float has the digits of a float.
     let single = text.replace("double", "float");
     assert_eq!(mesh("a.ply", single).vertices[3], [0.0, 1.0, f64::from(0.1f32)]);
-    fails("a.ply", text.replace("3 0 1 2\n", "3 0 1 4\n"), &["face 0", "vertex index 4", "0 to 3"]);
-    fails("a.ply", text.replace("3 0 1 2\n", "2 0 1\n"), &["face 0", "3 corners"]);
-    fails("a.ply", text.replace("1 1 0 7", "nan 1 0 7"), &["Line 17", "nan"]);
+    fails("a.ply", text.replace("3 0 1 2\n", "3 0 1 4\n"), &["a.ply:20:", "vertex index 4", "0 to 3"]);
+    fails("a.ply", text.replace("1 1 0 7", "nan 1 0 7"), &["a.ply:17:", "NaN", "not finite"]);
+    fails("a.ply", text.replace("1 1 0 7", "one 1 0 7"), &["a.ply:17:", "property x", "\"one\""]);
+    // A colour is of no matter.
+    assert_eq!(mesh("a.ply", text.replace("1 1 0 7", "1 1 0 red")).facets.len(), 3);
     let mut nan = binary(false);
     let third = nan.windows(10).position(|word| word == b"end_header").unwrap() + 11 + 2 * 25;
     nan[third..third + 8].copy_from_slice(&f64::NAN.to_le_bytes());
@@ -216,7 +221,7 @@ fn stl_text_keeps_its_digits() {
     assert_eq!(mesh.facets, [[0, 1, 2], [1, 3, 2]]);
     assert!(!mesh.has_normals());
     fails("a.stl", STL.replace("1.1", "nan"), &["a.stl:5:", "not finite"]);
-    fails("a.stl", STL.replace("1.1", "one"), &["a.stl:5:", "three numbers"]);
+    fails("a.stl", STL.replace("1.1", "one"), &["a.stl:5:", "three numbers", "\"vertex one 0 0\""]);
     fails("a.stl", STL.replacen("      vertex 0 1 0\n", "", 1), &["a.stl:7:", "three vertices"]);
     fails("a.stl", STL.split_once("  endfacet").unwrap().0, &["truncated"]);
     fails("a.stl", "solid nothing\nendsolid\n", &["empty"]);

@@ -133,7 +133,8 @@ fn sky_tables_come_in_three_formats() {
     use npyz::WriterBuilder;
     let colours: Vec<f32> = (0..36).map(|i| (i * 5 % 36) as f32).collect();
     let scene = |file: &str| {
-        let sky = format!("model = \"table\"\nfile = \"{file}\"");
+        // Pictures would run the other way round.
+        let sky = format!("model = \"table\"\ncolumns = \"counter_clockwise\"\nfile = \"{file}\"");
         format!("bands = 3\n{}", sky_scene(&sky, dvec3(1.0, 0.2, 0.3)))
     };
     let folder = Folder::with_scene(&scene("sky.npy"));
@@ -181,6 +182,45 @@ fn sky_tables_come_in_three_formats() {
     exr::prelude::Image::from_layer(layer).write().to_file(folder.path("sky.exr")).unwrap();
     folder.write("scene.toml", scene("sky.exr"));
     assert!(folder.image().1.iter().all(|x| *x == 0.75));
+}
+
+/// What stands to the right in a panorama stands to the right of it in an image from inside.
+#[test]
+fn panoramas_are_not_mirrored() {
+    let (rows, columns) = (90usize, 360usize);
+    let mut picture = vec![0f32; rows * columns];
+    for row in 40..50 {
+        picture[row * columns + 100] = 1.0;
+        picture[row * columns + 110] = 2.0;
+    }
+    let mut pfm = b"Pf\n360 90\n-1.0\n".to_vec();
+    picture.chunks(columns).rev().flatten().for_each(|x| pfm.extend(x.to_le_bytes()));
+    let scene = |keys: &str, azimuth_deg: f64| {
+        let (y, x) = azimuth_deg.to_radians().sin_cos();
+        let target = format!("target = [{x}, {y}, 3]");
+        sky_scene(&format!("model = \"table\"\nfile = \"sky.pfm\"{keys}"), DVec3::X)
+            .replace("target = [1, 0, 3]", &target)
+            .replace("fov_deg = 100", "fov_deg = 40")
+            .replace("resolution = [6, 8]", "resolution = [81, 41]")
+    };
+    // Column 100 lies 100.5 degrees from the first one's left edge, clockwise where nothing else is said.
+    for (keys, azimuth, right) in [
+        ("", -100.5, true),
+        ("\ncolumns = \"clockwise\"", -100.5, true),
+        ("\ncolumns = \"counter_clockwise\"", 100.5, false),
+    ] {
+        let folder = Folder::with_scene(&scene(keys, azimuth));
+        folder.write("sky.pfm", &pfm).write("plate.obj", PLATE);
+        let (_, pixels) = folder.image();
+        let row = &pixels[20 * 81..21 * 81];
+        let of = |from: f32, to: f32| {
+            let found: Vec<usize> = (0..81).filter(|i| row[*i] > from && row[*i] <= to).collect();
+            found.iter().sum::<usize>() as f64 / found.len() as f64
+        };
+        let (one, two) = (of(0.5, 1.0), of(1.0, 2.0));
+        assert!((one - 40.0).abs() < 2.0, "{keys}: {one}");
+        assert_eq!(two > one, right, "{keys}: {one}, {two}");
+    }
 }
 
 /// Four unit squares in the plane z = 0 of emissions 1 to 4: lower left, lower right, upper left, upper right.

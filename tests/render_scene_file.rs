@@ -116,17 +116,114 @@ fn syntax_and_types_are_told_with_their_line() {
     }
 }
 
+/// A mesh of two facets for each of the names.
+fn named(names: &[&str]) -> String {
+    let facets = names.iter().map(|name| format!("usemtl {name}\nf 1 2 3\n"));
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_string() + &facets.collect::<String>()
+}
+
 #[test]
 fn materials_must_match_the_mesh() {
-    let named = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl body\nf 1 2 3\n";
     let folder = Folder::with_scene(&edited("[material.default]", "[material.wing]"));
-    folder.write("plate.obj", named);
-    folder.fails_without_trace(&["scene.toml"], &["\"body\"", "[material.body]", "plate.obj"]);
-    let both = edited("[material.default]", "[material.wing]\n[material.default]");
-    folder.write("scene.toml", both);
-    folder.fails_without_trace(&["scene.toml"], &["material.wing", "no facet uses it", "body"]);
+    folder.write("plate.obj", named(&["body"]));
+    folder.fails_without_trace(&["scene.toml"], &["[material.body]", "[material.default]", "plate.obj"]);
     let folder = Folder::with_scene(&edited("[material.default]\ndiffuse = 0.4\n", ""));
-    folder.fails_without_trace(&["scene.toml"], &["\"default\"", "[material.default]"]);
+    folder.fails_without_trace(&["scene.toml"], &["[material.default]"]);
+    // A library of materials serves many meshes.
+    let library =
+        edited("[material.default]", "[material.wing]\n[material.\"two words\"]\n[material.default]");
+    let folder = Folder::with_scene(&library);
+    let told = folder.render(&["scene.toml"]).succeeds().stderr;
+    assert!(told.contains("[material.wing]") && told.contains("[material.\"two words\"]"), "{told}");
+}
+
+#[test]
+fn advice_on_material_names_works_when_pasted() {
+    for names in [
+        &["Material.001", "white paint"][..],
+        &["plain", "with-dash", "under_score", "7"],
+        &["quote\"inside", "back\\slash", "it's", "a]b", "#1", "\u{e4}\u{f6}\u{fc}", "tab\tinside"],
+        &["a.b.c", "..", "=", "[x]", "*", "(null)", "C:\\paint\\"],
+    ] {
+        let folder = Folder::with_scene(&edited("[material.default]\ndiffuse = 0.4\n", ""));
+        folder.write("plate.obj", named(names));
+        let told = folder.render(&["scene.toml"]).fails(&["no table"]).stderr;
+        // All names at once.
+        let list = told.split_once("expected ").unwrap().1.split_once(", or [material.default]").unwrap().0;
+        let mut rest = list;
+        let mut tables = String::new();
+        for _ in names {
+            // A header ends at "]," or at the end; names hold brackets only in quotes.
+            let end = header_end(rest);
+            tables += &format!("{}\ndiffuse = 0.4\n", &rest[..end]);
+            rest = rest[end..].trim_start_matches(", ");
+        }
+        assert_eq!(rest, "", "{told}");
+        folder.write("scene.toml", edited("[material.default]\ndiffuse = 0.4\n", &tables));
+        assert_eq!(folder.render(&["scene.toml"]).succeeds().stderr, "", "{tables}");
+    }
+    // What is written without quotes is told how to write.
+    refuses(
+        &edited("[material.default]", "[material.Material.001]"),
+        &["scene.toml:", "[material.\"Material.001\"]"],
+    );
+}
+
+/// The length of the TOML table header that begins the text.
+fn header_end(text: &str) -> usize {
+    let (mut quoted, mut escaped) = (false, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' if quoted => escaped = true,
+            '"' => quoted = !quoted,
+            ']' if !quoted => return at + 1,
+            _ => {}
+        }
+    }
+    panic!("no header: {text}");
+}
+
+#[test]
+fn reflectances_add_up_to_1_within_single_precision() {
+    // The floats nearest to x and to 1 - x, as a simulator in single precision holds a perfect reflector.
+    let pairs = (1..200).map(|i| i as f32 / 199.7).map(|x| (f64::from(x), f64::from(1.0 - x)));
+    let over: Vec<(f64, f64)> = pairs.filter(|(x, rest)| x + rest > 1.0).take(8).collect();
+    for (diffuse, specular) in &over {
+        let scene = edited("diffuse = 0.4", &format!("diffuse = {diffuse}\nspecular = {specular}"));
+        Folder::with_scene(&scene).render(&["scene.toml"]).succeeds();
+    }
+    // The example that was reported, and the same in the digits that f32 needs.
+    assert_eq!(over.len(), 8);
+    for (diffuse, specular) in [("0.44949105381965637", "0.550508975982666"), ("0.44949105", "0.550509")] {
+        let scene = edited("diffuse = 0.4", &format!("diffuse = {diffuse}\nspecular = {specular}"));
+        Folder::with_scene(&scene).render(&["scene.toml"]).succeeds();
+    }
+    Folder::with_scene(&edited("diffuse = 0.4", "diffuse = 1.0000001")).render(&["scene.toml"]).succeeds();
+    refuses(&edited("diffuse = 0.4", "diffuse = 1.000001"), &["material.default.diffuse", "0 to 1"]);
+    refuses(
+        &edited("diffuse = 0.4", "diffuse = 0.5\nspecular = 0.500001"),
+        &["diffuse + specular", "at most 1"],
+    );
+}
+
+#[test]
+fn the_scene_file_has_any_mark_and_any_line_end() {
+    let plain = Folder::with_scene(SCENE).image();
+    for end in ["\n", "\r\n", "\r"] {
+        let text = SCENE.replace('\n', end);
+        let wide: Vec<u16> = std::iter::once(0xfeff).chain(text.encode_utf16()).collect();
+        let little = wide.iter().flat_map(|unit| unit.to_le_bytes()).collect();
+        let big = wide.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+        for content in [text.clone().into_bytes(), format!("\u{feff}{text}").into_bytes(), little, big] {
+            let folder = Folder::with_scene(SCENE);
+            folder.write("scene.toml", content);
+            assert_eq!(folder.image(), plain);
+        }
+    }
+    let folder = Folder::with_scene(SCENE);
+    folder.write("scene.toml", [SCENE.as_bytes(), b"# Gr\xfcn\n"].concat());
+    folder.fails_without_trace(&["scene.toml"], &["scene.toml:15:", "UTF-8"]);
 }
 
 #[test]
@@ -136,11 +233,10 @@ fn bad_meshes_are_told_with_file_and_line() {
         (String::new(), &["empty", "at least one facet"]),
         (triangle.into(), &["empty", "at least one facet"]),
         (format!("v 0 nan 0\n{triangle}f 1 2 3\n"), &["plate.obj:1:", "not finite"]),
-        (format!("{triangle}v 1e999 0 0\nf 1 2 3\n"), &["plate.obj:4:", "not finite"]),
+        (format!("{triangle}v 1e999 0 0\nf 1 2 4\n"), &["plate.obj:4:", "not finite"]),
         (format!("{triangle}f 1 2 4\n"), &["plate.obj:4:", "vertex index 4", "1 to 3"]),
         (format!("{triangle}f 0 1 2\n"), &["plate.obj:4:", "vertex index 0", "1 to 3"]),
         (format!("{triangle}f 1 2 -4\n"), &["plate.obj:4:", "out of range"]),
-        (format!("{triangle}f 1//1 2//1 3//1\n"), &["plate.obj:4:", "normal index 1"]),
         (format!("{triangle}f 1 2\n"), &["plate.obj:4:", "3 corners"]),
         (format!("{triangle}f 1 2 x\n"), &["plate.obj:4:", "\"x\""]),
         (format!("{triangle}v 1 2\nf 1 2 3\n"), &["plate.obj:4:", "three numbers"]),
@@ -159,6 +255,19 @@ fn bad_meshes_are_told_with_file_and_line() {
     folder.fails_without_trace(&["scene.toml"], &["plate.3ds", ".obj, .ply, .stl, .gltf or .glb"]);
     folder.write("scene.toml", edited("plate.obj", "plate.obj\"\nsmooth = true\n#"));
     folder.fails_without_trace(&["scene.toml"], &["plate.obj", "smooth", "vertex normals"]);
+    // Normals are looked at where they are asked for.
+    for (normals, words) in [
+        ("f 1//1 2//1 3//1\n", "plate.obj:4: normal index 1 is out of range"),
+        ("f 1//-1 2//-1 3//-1\n", "plate.obj:4: normal index -1 is out of range"),
+        ("vn 0 0 0\nf 1//1 2//1 3//1\n", "plate.obj:4: vertex normal"),
+        ("vn nan 0 0\nvn 0 0 1\nf 1//1 2//2 3//2\n", "plate.obj:4: vertex normal"),
+        ("vn 0 0\nf 1//1 2//1 3//1\n", "plate.obj:4: vertex normal"),
+    ] {
+        folder.write("plate.obj", format!("{triangle}{normals}"));
+        folder.fails_without_trace(&["scene.toml"], &[words, "smooth"]);
+    }
+    folder.write("plate.obj", format!("{triangle}vn 0 0 0\nvn 0 0 1\nf 1//2 2//2 3//2\n"));
+    folder.render(&["scene.toml"]).succeeds();
 }
 
 #[test]
@@ -186,7 +295,7 @@ fn bad_sky_tables_are_told() {
     folder.write("sky.exr", "not an image").write("scene.toml", table("sky.exr"));
     run(&["sky.exr"]);
     folder.write("sky.txt", "1 1").write("scene.toml", table("sky.txt"));
-    run(&[".npy, .exr or .pfm"]);
+    run(&[".npy, .exr, .hdr or .pfm"]);
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub fn mesh() -> Mesh {
         facet_normals: vec![[NO_NORMAL; 3]; facets],
         facet_materials: vec![0; facets],
         material_names: vec!["default".into()],
+        ..Mesh::default()
     }
 }
 

@@ -10,6 +10,8 @@ pub const HELP: &str = "\
 Photometric images of faceted diffuse-mirror objects.
 
 usage: render [SCENE.toml] [options]
+       render --check SCENE.toml
+       render --list MESH
 
 With no scene it renders the built-in aircraft with a diffuse-dominated and a mirror-dominated finish and writes
 aircraft_diffuse and aircraft_mirror as PNG and EXR into the current folder.
@@ -23,6 +25,10 @@ aircraft_diffuse and aircraft_mirror as PNG and EXR into the current folder.
   --threads N          0 (default): all cores
   --exposure X         factor of the PNG's linear values (default 1)
   --bands A,B,C        bands shown as red, green and blue in the PNG; one number: that band in grey
+  --check SCENE.toml   reads the scene and all that it names, says what it found, and renders nothing
+  --list MESH          materials, facet counts, size, open edges and fronts of a mesh file, as comments of a scene
+                       file to start from; an OBJ's material library gives the reflectances
+  --manual             the manual of the scene file: kernel/examples/render/SCENE.md
   --help, --version
 
 Exit status: 0 done, 2 wrong usage, 1 anything else (nothing written).
@@ -34,6 +40,12 @@ pub enum Command {
     Help,
     /// Print the version.
     Version,
+    /// Print the manual of the scene file.
+    Manual,
+    /// Read a scene file and all that it names.
+    Check(PathBuf),
+    /// Say what is in a mesh file.
+    List(PathBuf),
     /// Render.
     Render(Options),
 }
@@ -59,15 +71,32 @@ pub struct Options {
     pub bands: Option<Vec<usize>>,
 }
 
+impl Options {
+    /// Whether nothing but a scene is given.
+    fn is_plain(&self) -> bool {
+        self.images.is_empty()
+            && self.report.is_none()
+            && self.facets.is_none()
+            && self.components.is_none()
+            && self.threads.is_none()
+            && self.exposure.is_none()
+            && self.bands.is_none()
+    }
+}
+
 /// Reads the command line (without the program's name). The error is a sentence about wrong usage.
 pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Command, String> {
     use lexopt::prelude::*;
     let mut options = Options::default();
+    let (mut check_only, mut list) = (false, None);
     let mut parser = lexopt::Parser::from_args(arguments);
     while let Some(argument) = parser.next().map_err(|e| e.to_string())? {
         match argument {
             Long("help") | Short('h') => return Ok(Command::Help),
             Long("version") | Short('V') => return Ok(Command::Version),
+            Long("manual") => return Ok(Command::Manual),
+            Long("check") => check_only = true,
+            Long("list") => once("--list", &mut list, value(&mut parser)?.into())?,
             Long("out") => {
                 let path = PathBuf::from(value(&mut parser)?);
                 let format = Format::of(&path)?;
@@ -93,6 +122,19 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Command, S
             Value(path) => once("a scene file", &mut options.scene, path.into())?,
             other => return Err(other.unexpected().to_string()),
         }
+    }
+    if let Some(mesh) = list {
+        let alone = options.scene.is_none() && options.is_plain() && !check_only;
+        return if alone {
+            Ok(Command::List(mesh))
+        } else {
+            Err("--list stands alone: expected a mesh file".into())
+        };
+    }
+    if check_only {
+        let plain = options.is_plain();
+        let scene = options.scene.filter(|_| plain);
+        return scene.map(Command::Check).ok_or("--check takes a scene file and no other option".into());
     }
     check(options).map(Command::Render)
 }

@@ -1,10 +1,11 @@
-//! The one kind of failure: a line for the user that names the file, line or key, and what was expected.
+//! Messages for the user: a failure ends the program, a warning does not. Both name the file, line or key, and what was
+//! expected.
 
 use std::fmt;
 use std::path::Path;
 
 /// A sentence for standard error; never more than one line.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Failure(String);
 
 /// What anything that can fail returns.
@@ -31,5 +32,44 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
+    }
+}
+
+/// Warnings in the order of their first occurrence. A kind that occurs again is counted, not repeated.
+#[derive(Debug, Default)]
+pub struct Warnings(Vec<Warning>);
+
+#[derive(Debug)]
+struct Warning {
+    kind: &'static str,
+    first: Failure,
+    count: usize,
+}
+
+impl Warnings {
+    /// Adds an occurrence of `kind`; `message` is called for the first.
+    pub fn add(&mut self, kind: &'static str, message: impl FnOnce() -> Failure) {
+        match self.0.iter_mut().find(|warning| warning.kind == kind) {
+            Some(warning) => warning.count += 1,
+            None => self.0.push(Warning { kind, first: message(), count: 1 }),
+        }
+    }
+
+    /// One warning.
+    pub fn of(message: Failure) -> Self {
+        Warnings(vec![Warning { kind: "", first: message, count: 1 }])
+    }
+
+    /// Appends those of another reader.
+    pub fn append(&mut self, other: Warnings) {
+        self.0.extend(other.0);
+    }
+
+    /// One line for each kind.
+    pub fn lines(&self) -> impl Iterator<Item = String> {
+        self.0.iter().map(|warning| match warning.count {
+            1 => warning.first.to_string(),
+            n => format!("{} ({n} like this, the first is named)", warning.first),
+        })
     }
 }

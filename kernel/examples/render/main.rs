@@ -10,9 +10,12 @@
 mod aircraft;
 mod built_in;
 mod cli;
+mod doubts;
 mod facets_file;
 mod failure;
 mod image_file;
+mod list;
+mod load;
 mod materials;
 mod mesh_file;
 mod outputs;
@@ -23,6 +26,8 @@ mod scene_file;
 mod sky_table;
 mod summary;
 mod targets;
+mod text_file;
+mod view;
 
 use std::io::Write;
 use std::path::Path;
@@ -30,11 +35,11 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use cli::{Command, Options};
-use failure::Outcome;
+use failure::{Outcome, Warnings};
 use outputs::Outputs;
 use pipeline::{Job, Rendered};
 use progress::Progress;
-use scene_file::{Model, Scene};
+use scene_file::Scene;
 use targets::Targets;
 
 fn main() -> ExitCode {
@@ -55,6 +60,12 @@ fn main() -> ExitCode {
             say(concat!("render ", env!("CARGO_PKG_VERSION"), "\n"));
             Ok(())
         }
+        Command::Manual => {
+            say(scene_file::MANUAL);
+            Ok(())
+        }
+        Command::List(path) => list::write(&path).map(|text| say(&text)),
+        Command::Check(path) => check_scene(&path),
         Command::Render(options) => match &options.scene {
             Some(path) => render_scene(path, &options),
             None => render_built_in(&options),
@@ -77,35 +88,47 @@ fn say(text: &str) {
 fn render_scene(path: &Path, options: &Options) -> Outcome<()> {
     let start = Instant::now();
     let progress = Progress::start();
-    let scene = scene_file::read(path)?;
+    let scene = load::scene(path)?;
     let targets = Targets::of_scene(path, &scene, options)?;
-    let table = match scene.sky.as_ref().map(|sky| &sky.model) {
-        Some(Model::Table { file, .. }) => Some(file.as_path()),
-        _ => None,
-    };
-    let inputs = [path, &scene.mesh].into_iter().chain(table);
-    outputs::check(targets.paths(), inputs)?;
-    let mesh = mesh_file::read(&scene.mesh)?;
-    let job = Job {
-        path,
-        materials: materials::assign(path, &scene, &mesh)?,
-        table: table.map(|file| sky_table::read(file, scene.bands)).transpose()?,
-        scene: &scene,
-        mesh: &mesh,
-        threads: options.threads.unwrap_or(0),
-        facets: options.facets.is_some(),
-        components: options.components.is_some(),
-    };
+    load::check_targets(path, &scene, targets.paths())?;
+    let mut loaded = load::files(path, scene)?;
+    let mut warnings = std::mem::take(&mut loaded.warnings);
+    let mut job = loaded.job(path)?;
+    job.threads = options.threads.unwrap_or(0);
+    (job.facets, job.components) = (options.facets.is_some(), options.components.is_some());
     let read = start.elapsed().as_secs_f64();
     let mut rendered = pipeline::run(&job, &progress)?;
+    warnings.append(doubts::of(&job, &rendered.report.view));
+    warnings.append(doubts::of_image(&job, &rendered.report.view, &rendered.pixels));
     rendered.report.seconds.read = read;
+    rendered.report.warnings = warnings.lines().collect();
     let mut outputs = Outputs::default();
     progress.stage("writing");
     targets.write(&mut rendered, start, &mut outputs)?;
     outputs.commit()?;
     drop(progress);
-    report(&[(path.display().to_string(), &scene, &rendered)], targets.paths());
+    warn(&warnings);
+    report(&[(path.display().to_string(), &loaded.scene, &rendered)], targets.paths());
     Ok(())
+}
+
+/// Reads all that the scene file names and renders nothing.
+fn check_scene(path: &Path) -> Outcome<()> {
+    let mut loaded = load::files(path, load::scene(path)?)?;
+    let mut warnings = std::mem::take(&mut loaded.warnings);
+    let job = loaded.job(path)?;
+    let view = pipeline::check(&job)?;
+    warnings.append(doubts::of(&job, &view));
+    warn(&warnings);
+    let mut text = Vec::new();
+    // Writing to memory does not fail.
+    let _ = summary::check(path, &job, &view, &mut text);
+    say(&String::from_utf8_lossy(&text));
+    Ok(())
+}
+
+fn warn(warnings: &Warnings) {
+    warnings.lines().for_each(|line| eprintln!("warning: {line}"));
 }
 
 fn render_built_in(options: &Options) -> Outcome<()> {

@@ -3,19 +3,23 @@
 use std::path::Path;
 
 use blik_kernel::Error;
+use blik_kernel::arena::Memory;
+use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
 use blik_kernel::host::{GeometryMemory, Host, Lit, Rounds, Settings};
-use blik_kernel::scene::{Gloss, MaterialInput, SceneInput};
-use blik_kernel::sky::{SkyInput, SkyModel, SkyTable};
-use blik_kernel::sun::SunInput;
+use blik_kernel::scene::{Gloss, MaterialInput, Scene as KernelScene, SceneInput};
+use blik_kernel::simd::Isa;
+use blik_kernel::sky::{Sky as KernelSky, SkyInput, SkyModel, SkyTable};
+use blik_kernel::sun::{Sun as KernelSun, SunInput};
 
 use crate::facets_file::Row;
 use crate::failure::{Failure, Outcome};
 use crate::mesh_file::Mesh;
 use crate::progress::Progress;
 use crate::report_file::Report;
-use crate::scene_file::{self, Camera, Material, Model, Scene, Sky};
+use crate::scene_file::{self, Camera, Material, Model, Scene, Sky, Sun};
 use crate::sky_table::Table;
+use crate::view::View;
 
 /// All that an image is made of.
 pub struct Job<'a> {
@@ -28,7 +32,7 @@ pub struct Job<'a> {
     /// The material table of each of the mesh's material names.
     pub materials: Vec<&'a Material>,
     /// The sky's table, where its model is one.
-    pub table: Option<Table>,
+    pub table: Option<&'a Table>,
     /// 0: all cores.
     pub threads: usize,
     /// Whether the facets' irradiances are wanted.
@@ -55,11 +59,42 @@ pub struct Rendered {
 
 /// Computes the image.
 pub fn run(job: &Job, progress: &Progress) -> Outcome<Rendered> {
-    if job.scene.smooth && !job.mesh.has_normals() {
+    check_normals(job)?;
+    compute(job, progress).map_err(|error| describe(job, error))
+}
+
+/// Finds out whether the kernel takes the scene, and what the camera sees of it.
+pub fn check(job: &Job) -> Outcome<View> {
+    check_normals(job)?;
+    let look = || -> Result<View, Error> {
+        let materials: Vec<MaterialInput> =
+            job.materials.iter().map(|material| material_input(material)).collect();
+        let input = scene_input(job, &materials);
+        let mut memory = Memory::new(KernelScene::bytes(&input)?);
+        let scene = KernelScene::new(&input, memory.bytes_mut())?;
+        if let Some(sky) = &job.scene.sky {
+            KernelSky::new(&sky_input(sky, job.table), scene.bands())?;
+        }
+        if let Some(sun) = &job.scene.sun {
+            KernelSun::new(&sun_input(sun), scene.bands())?;
+        }
+        let mut memory = Memory::new(Bvh::bytes(scene.facets())?);
+        let bvh = Bvh::build(scene.corners(), scene.areas(), Isa::detect(), memory.bytes_mut())?;
+        View::new(&scene, &bvh, &camera_input(&job.scene.camera))
+    };
+    look().map_err(|error| describe(job, error))
+}
+
+/// What `smooth` asks of the mesh file.
+fn check_normals(job: &Job) -> Outcome<()> {
+    if job.scene.smooth && !job.mesh.has_normals() && job.mesh.normal_fault.is_none() {
         let what = "smooth = true: expected a mesh file with vertex normals, this one has none";
         return Err(Failure::at(&job.scene.mesh, what));
     }
-    compute(job, progress).map_err(|error| describe(job, error))
+    if let Some(fault) = job.mesh.normal_fault.as_ref().filter(|_| job.scene.smooth) {
+        return Err(Failure::new(format_args!("{fault} (smooth = true asks for normals)")));
+    }
+    Ok(())
 }
 
 fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
@@ -67,12 +102,8 @@ fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
     let host = Host::new(job.threads)?;
     let materials: Vec<MaterialInput> =
         job.materials.iter().map(|material| material_input(material)).collect();
-    let sky = scene.sky.as_ref().map(|sky| sky_input(sky, job.table.as_ref()));
-    let sun = scene.sun.as_ref().map(|sun| SunInput {
-        direction: sun.direction,
-        irradiance: &sun.irradiance,
-        half_angle_deg: sun.half_angle_deg,
-    });
+    let sky = scene.sky.as_ref().map(|sky| sky_input(sky, job.table));
+    let sun = scene.sun.as_ref().map(sun_input);
     let mut rounds = Rounds::new(scene.tolerance);
     let mut memory = GeometryMemory::default();
     loop {
@@ -89,7 +120,8 @@ fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
         progress.stage("light");
         let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
         progress.stage("image");
-        let mut image = host.image(&lit, &camera_input(&scene.camera), job.components)?;
+        let camera = camera_input(&scene.camera);
+        let mut image = host.image(&lit, &camera, job.components)?;
         if rounds.again(&mut image.report) {
             continue;
         }
@@ -99,7 +131,7 @@ fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
             pixels: image.pixels,
             components: image.components,
             facets: if job.facets { facet_rows(&lit) } else { Vec::new() },
-            report: Report::new(image.report),
+            report: Report::new(image.report, View::new(geometry.scene(), geometry.bvh(), &camera)?),
         });
     }
 }
@@ -154,6 +186,10 @@ fn sky_input<'a>(sky: &'a Sky, table: Option<&'a Table>) -> SkyInput<'a> {
         (Model::Uniform | Model::Table { .. }, _) => SkyModel::Uniform,
     };
     SkyInput { model, radiance: &sky.radiance, ground: &sky.ground, up: sky.up }
+}
+
+fn sun_input(sun: &Sun) -> SunInput<'_> {
+    SunInput { direction: sun.direction, irradiance: &sun.irradiance, half_angle_deg: sun.half_angle_deg }
 }
 
 fn camera_input(camera: &Camera) -> CameraInput {

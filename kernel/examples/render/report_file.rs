@@ -6,6 +6,8 @@ use std::io::{self, Write};
 use blik_kernel::host;
 use serde::Serialize;
 
+use crate::view::View;
+
 /// What was computed, how well, and with what effort. The fields are the keys of the file.
 #[derive(Serialize)]
 pub struct Report {
@@ -49,6 +51,10 @@ pub struct Report {
     pub skipped: BTreeMap<&'static str, u64>,
     /// The image's integrals.
     pub signature: Signature,
+    /// What the camera sees.
+    pub view: View,
+    /// What was passed over, not applied, or is seldom meant; as on standard error.
+    pub warnings: Vec<String>,
 }
 
 /// Bounds, relative to the reference radiance.
@@ -123,7 +129,7 @@ pub struct Signature {
 
 impl Report {
     /// The kernel's report in the file's words; seconds of reading, writing and in total are 0.
-    pub fn new(of: host::Report) -> Self {
+    pub fn new(of: host::Report, view: View) -> Self {
         Report {
             version: env!("CARGO_PKG_VERSION"),
             tolerance: of.tolerance,
@@ -181,6 +187,8 @@ impl Report {
                 error: of.signature.error,
                 unresolved_glints: of.signature.unresolved_glints,
             },
+            view,
+            warnings: Vec::new(),
         }
     }
 }

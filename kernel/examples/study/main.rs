@@ -47,8 +47,14 @@ mod progress;
 mod report_file;
 #[path = "../render/scene_file/mod.rs"]
 mod scene_file;
-#[path = "../render/sky_table.rs"]
+#[path = "../render/sky_table/mod.rs"]
 mod sky_table;
+#[allow(dead_code)]
+#[path = "../render/text_file.rs"]
+mod text_file;
+#[allow(dead_code)]
+#[path = "../render/view.rs"]
+mod view;
 
 use std::error::Error;
 use std::path::PathBuf;

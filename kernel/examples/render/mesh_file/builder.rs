@@ -1,11 +1,11 @@
 //! Collects a file's vertices and polygons, checks them and makes triangles of them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Display;
 use std::path::Path;
 
-use super::polygon::{self, Triangle};
-use super::{Mesh, NO_NORMAL};
+use super::polygon::{self, Shape, Triangle};
+use super::{Finish, Mesh, NO_NORMAL};
 use crate::failure::{Failure, Outcome};
 
 /// One corner of a polygon. Indices are checked only at the end: a file may name vertices before it lists them.
@@ -41,19 +41,24 @@ pub struct Builder<'a> {
     materials: HashMap<String, u32>,
     corners: Vec<Corner>,
     polygons: Vec<Polygon>,
+    /// Vertices that are not finite: an error where a facet has one.
+    bad_vertices: BTreeMap<u32, Failure>,
+    /// Vertex normals without a direction: of no matter as long as none are asked for.
+    bad_normals: BTreeMap<u32, Failure>,
 }
 
 impl<'a> Builder<'a> {
     /// An empty mesh of the file at `path`, whose format counts vertices from `first_index`.
     pub fn new(path: &'a Path, first_index: i64) -> Self {
-        let mesh = Mesh::default();
         Builder {
             path,
             first_index,
-            mesh,
+            mesh: Mesh::default(),
             materials: HashMap::new(),
             corners: Vec::new(),
             polygons: Vec::new(),
+            bad_vertices: BTreeMap::new(),
+            bad_normals: BTreeMap::new(),
         }
     }
 
@@ -67,16 +72,23 @@ impl<'a> Builder<'a> {
         self.mesh.normals.len()
     }
 
-    /// Adds a vertex.
-    pub fn vertex(&mut self, place: Place, position: [f64; 3]) -> Outcome<()> {
-        self.mesh.vertices.push(self.finite(place, "vertex", position)?);
-        Ok(())
+    /// Adds a vertex of an item at `place`.
+    pub fn vertex(&mut self, place: Place, item: &str, position: [f64; 3]) {
+        if !position.iter().all(|x| x.is_finite()) {
+            let what = format!("vertex {position:?} is not finite: expected three finite numbers");
+            self.bad_vertices.insert(self.vertices() as u32, self.fail(place, item, what));
+        }
+        self.mesh.vertices.push(position);
     }
 
     /// Adds a vertex normal.
-    pub fn normal(&mut self, place: Place, normal: [f64; 3]) -> Outcome<()> {
-        self.mesh.normals.push(self.finite(place, "vertex normal", normal)?);
-        Ok(())
+    pub fn normal(&mut self, place: Place, normal: [f64; 3]) {
+        if !normal.iter().all(|x| x.is_finite()) || normal == [0.0; 3] {
+            let what =
+                format!("vertex normal {normal:?}: expected a direction, three finite numbers, not all 0");
+            self.bad_normals.insert(self.normals() as u32, self.fail(place, "vertex normal", what));
+        }
+        self.mesh.normals.push(normal);
     }
 
     /// The index of the material called `name`.
@@ -90,28 +102,67 @@ impl<'a> Builder<'a> {
         index
     }
 
-    /// Adds a polygon.
-    pub fn polygon(
-        &mut self,
-        place: Place,
-        corners: impl IntoIterator<Item = Corner>,
-        material: u32,
-    ) -> Outcome<()> {
+    /// Says that facets of this material are seen from both sides, as the file has it.
+    pub fn double_sided(&mut self, material: u32) {
+        if !self.mesh.double_sided.contains(&material) {
+            self.mesh.double_sided.push(material);
+        }
+    }
+
+    /// Notes how the file says that a material looks.
+    pub fn finish_of(&mut self, material: &str, finish: Finish) {
+        self.mesh.finishes.insert(material.to_owned(), finish);
+    }
+
+    /// Names a file of material properties.
+    pub fn library(&mut self, name: &str) {
+        self.mesh.libraries.push(name.to_owned());
+    }
+
+    /// Adds a polygon; one of fewer than three corners is passed over with a warning.
+    pub fn polygon(&mut self, place: Place, corners: impl IntoIterator<Item = Corner>, material: u32) {
         let start = self.corners.len();
         self.corners.extend(corners);
         let corners = start..self.corners.len();
         if corners.len() < 3 {
-            let what = format!("expected a face of at least 3 corners, got {}", corners.len());
-            return Err(self.fail(place, "face", what));
+            let what = format!("expected a face of at least 3 corners, got {}: passed over", corners.len());
+            self.warn("few corners", place, "face", what);
+            self.corners.truncate(start);
+            return;
         }
         self.polygons.push(Polygon { corners, material, place });
-        Ok(())
+    }
+
+    /// Warns of `what`; a kind that occurs again is counted.
+    pub fn warn(&mut self, kind: &'static str, place: Place, item: &str, what: impl Display) {
+        let failure = self.fail(place, item, what);
+        self.mesh.warnings.add(kind, || failure);
+    }
+
+    /// Warns of something that has no one place.
+    pub fn warn_of_file(&mut self, kind: &'static str, what: impl Display) {
+        self.mesh.warnings.add(kind, || Failure::at(self.path, what));
+    }
+
+    /// Says why the file's normals cannot be used.
+    pub fn normal_fault(&mut self, place: Place, item: &str, what: impl Display) {
+        let failure = self.fail(place, item, what);
+        self.mesh.normal_fault.get_or_insert(failure);
     }
 
     /// Checks all indices and makes the triangles.
     pub fn finish(mut self) -> Outcome<Mesh> {
         if self.polygons.is_empty() {
-            return Err(Failure::at(self.path, "the mesh is empty: expected at least one facet"));
+            let passed: Vec<String> = self.mesh.warnings.lines().collect();
+            let why = if passed.is_empty() {
+                format!("no facet among {} vertices", self.vertices())
+            } else {
+                format!("no facet is left: {}", passed.join("; "))
+            };
+            return Err(Failure::at(
+                self.path,
+                format_args!("the mesh is empty ({why}): expected at least one facet"),
+            ));
         }
         if self.mesh.vertices.len() >= u32::MAX as usize || self.mesh.normals.len() >= u32::MAX as usize {
             return Err(Failure::at(self.path, "too many vertices: expected fewer than 2^32 - 1"));
@@ -123,7 +174,10 @@ impl<'a> Builder<'a> {
             points.clear();
             points.extend(corners.iter().map(|corner| self.mesh.vertices[corner[0] as usize]));
             triangles.clear();
-            polygon::triangulate(&points, &mut triangles);
+            if polygon::triangulate(&points, &mut triangles) == Shape::Crossing {
+                let what = "the polygon crosses itself: some of its triangles overlap";
+                self.warn("crossing polygon", polygon.place, "face", what);
+            }
             for Triangle(triangle) in &triangles {
                 self.mesh.facets.push(triangle.map(|i| corners[i][0]));
                 self.mesh.facet_normals.push(triangle.map(|i| corners[i][1]));
@@ -133,46 +187,64 @@ impl<'a> Builder<'a> {
         if self.mesh.facets.len() >= u32::MAX as usize {
             return Err(Failure::at(self.path, "too many facets: expected fewer than 2^32 - 1"));
         }
+        self.replace_unused();
         Ok(self.mesh)
     }
 
-    /// Vertex and normal index of every corner, in range.
-    fn checked(&self, polygon: &Polygon) -> Outcome<Vec<[u32; 2]>> {
-        let index = |what: &str, index: i64, count: usize| {
-            usize::try_from(index).ok().filter(|i| *i < count).map(|i| i as u32).ok_or_else(|| {
-                let (got, first) = (index.saturating_add(self.first_index), self.first_index);
-                let last = count as i64 - 1 + first;
-                let range =
-                    if count == 0 { "none is given".into() } else { format!("expected {first} to {last}") };
-                self.fail(polygon.place, "face", format_args!("{what} index {got} is out of range: {range}"))
-            })
-        };
-        self.corners[polygon.corners.clone()]
-            .iter()
-            .map(|corner| {
-                let vertex = index("vertex", corner.vertex, self.mesh.vertices.len())?;
-                let normal = match corner.normal {
-                    None => NO_NORMAL,
-                    Some(normal) => index("normal", normal, self.mesh.normals.len())?,
-                };
-                Ok([vertex, normal])
-            })
-            .collect()
-    }
-
-    fn finite(&self, place: Place, item: &str, v: [f64; 3]) -> Outcome<[f64; 3]> {
-        if v.iter().all(|x| x.is_finite()) {
-            Ok(v)
-        } else {
-            Err(self.fail(
-                place,
-                item,
-                format_args!("{item} {v:?} is not finite: expected three finite numbers"),
-            ))
+    /// Vertices that no facet has may be anything.
+    fn replace_unused(&mut self) {
+        for (index, failure) in std::mem::take(&mut self.bad_vertices) {
+            self.mesh.vertices[index as usize] = [0.0; 3];
+            self.mesh
+                .warnings
+                .add("bad vertex", || Failure::new(format_args!("{failure} (no facet has it)")));
+        }
+        for index in self.bad_normals.keys() {
+            self.mesh.normals[*index as usize] = [0.0, 0.0, 1.0];
         }
     }
 
-    fn fail(&self, place: Place, item: &str, what: impl Display) -> Failure {
+    /// Vertex and normal index of every corner, in range.
+    fn checked(&mut self, polygon: &Polygon) -> Outcome<Vec<[u32; 2]>> {
+        let mut checked = Vec::with_capacity(polygon.corners.len());
+        for corner in &self.corners[polygon.corners.clone()] {
+            let vertex = self.index(polygon, "vertex", corner.vertex, self.mesh.vertices.len())?;
+            if let Some(failure) = self.bad_vertices.get(&vertex) {
+                return Err(failure.clone());
+            }
+            let normal = corner.normal.map(|n| self.index(polygon, "normal", n, self.mesh.normals.len()));
+            let normal = match normal {
+                None => NO_NORMAL,
+                Some(Ok(normal)) => match self.bad_normals.get(&normal) {
+                    None => normal,
+                    Some(failure) => {
+                        self.mesh.normal_fault.get_or_insert_with(|| failure.clone());
+                        NO_NORMAL
+                    }
+                },
+                Some(Err(failure)) => {
+                    self.mesh.normal_fault.get_or_insert(failure);
+                    NO_NORMAL
+                }
+            };
+            checked.push([vertex, normal]);
+        }
+        Ok(checked)
+    }
+
+    fn index(&self, polygon: &Polygon, what: &str, index: i64, count: usize) -> Outcome<u32> {
+        let found = usize::try_from(index).ok().filter(|i| *i < count).map(|i| i as u32);
+        found.ok_or_else(|| {
+            let (got, first) = (index.saturating_add(self.first_index), self.first_index);
+            let last = count as i64 - 1 + first;
+            let range =
+                if count == 0 { "none is given".into() } else { format!("expected {first} to {last}") };
+            self.fail(polygon.place, "face", format_args!("{what} index {got} is out of range: {range}"))
+        })
+    }
+
+    /// The failure of an item of the file.
+    pub fn fail(&self, place: Place, item: &str, what: impl Display) -> Failure {
         match place {
             Place::Line(line) => Failure::at_line(self.path, line, what),
             Place::Item(index) => Failure::at(self.path, format_args!("{item} {index}: {what}")),

@@ -2,14 +2,16 @@
 
 mod builder;
 mod gltf;
+mod mtl;
 mod obj;
 mod ply;
 mod polygon;
 mod stl;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, Outcome, Warnings};
 
 /// "No vertex normal" in [`Mesh::facet_normals`].
 pub const NO_NORMAL: u32 = u32::MAX;
@@ -29,9 +31,42 @@ pub struct Mesh {
     pub facet_materials: Vec<u32>,
     /// Names in the order of first use; "default" where the file names none.
     pub material_names: Vec<String>,
+    /// Materials that the file declares to be seen from both sides.
+    pub double_sided: Vec<u32>,
+    /// Files of material properties that the file names.
+    pub libraries: Vec<String>,
+    /// How the file says that its materials look, by name: values to start from.
+    pub finishes: BTreeMap<String, Finish>,
+    /// Why the vertex normals cannot be used, where they cannot.
+    pub normal_fault: Option<Failure>,
+    /// What was passed over or not applied.
+    pub warnings: Warnings,
+}
+
+/// Reflectances and emission of a material in red, green and blue, as drawing programs mean them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Finish {
+    /// Diffuse reflectance.
+    pub diffuse: [f64; 3],
+    /// Mirror reflectance.
+    pub specular: [f64; 3],
+    /// Own radiance.
+    pub emission: [f64; 3],
 }
 
 impl Mesh {
+    /// The lowest and the highest coordinates of all facets.
+    pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
+        let mut bounds = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for vertex in self.facets.iter().flatten().map(|i| self.vertices[*i as usize]) {
+            for axis in 0..3 {
+                bounds.0[axis] = bounds.0[axis].min(vertex[axis]);
+                bounds.1[axis] = bounds.1[axis].max(vertex[axis]);
+            }
+        }
+        bounds
+    }
+
     /// Whether any corner has a vertex normal.
     pub fn has_normals(&self) -> bool {
         self.facet_normals.iter().flatten().any(|index| *index != NO_NORMAL)
@@ -53,4 +88,14 @@ pub fn read(path: &Path) -> Outcome<Mesh> {
     };
     let bytes = std::fs::read(path).map_err(|e| Failure::at(path, e))?;
     reader(path, &bytes)
+}
+
+/// How the libraries that the mesh file at `path` names say that its materials look, and what they say more.
+pub fn libraries(path: &Path, mesh: &Mesh) -> (BTreeMap<String, Finish>, Warnings) {
+    let mut warnings = Warnings::default();
+    let mut finishes = mesh.finishes.clone();
+    for names in &mesh.libraries {
+        mtl::read(path, names, &mut finishes, &mut warnings);
+    }
+    (finishes, warnings)
 }

@@ -60,8 +60,11 @@ impl Check<'_> {
                 return Err(self.fail(key, &expected, values));
             }
         };
-        let expected =
-            if largest.is_finite() { format!("0 to {largest}") } else { "a finite number from 0 up".into() };
+        let expected = if largest.is_finite() {
+            format!("0 to {}", largest.floor())
+        } else {
+            "a finite number from 0 up".into()
+        };
         match values.iter().find(|x| !(x.is_finite() && **x >= 0.0 && **x <= largest)) {
             Some(x) => Err(self.fail(key, &expected, x)),
             None => Ok(values),

@@ -65,6 +65,7 @@ pub struct Sky {
     pub sun_direction: Option<[f64; 3]>,
     pub file: Option<PathBuf>,
     pub azimuth_zero: Option<[f64; 3]>,
+    pub columns: Option<Columns>,
 }
 
 /// `model` of the sky.
@@ -77,6 +78,16 @@ pub enum SkyModel {
     Cie,
     Gradient,
     Table,
+}
+
+/// Sense of a table's columns, seen from the zenith.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case")]
+pub enum Columns {
+    /// As a panorama is seen from inside, left to right.
+    Clockwise,
+    /// As azimuths are counted in mathematics.
+    CounterClockwise,
 }
 
 /// `[sun]`

@@ -7,11 +7,16 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::failure::{Failure, Outcome};
+use crate::text_file;
 use blik_kernel::camera::MAX_RESOLUTION;
 use blik_kernel::scene::MOST_REFLECTANCE;
 use check::Check;
 use glam::DVec3;
+pub use keys::Columns;
 use keys::{CameraKind, CameraSampling, Keys, SkyModel};
+
+/// The manual of the scene file: every key with its unit, range, default and meaning.
+pub const MANUAL: &str = include_str!("../SCENE.md");
 
 /// A scene as the file states it, all values checked, arrays with one entry per band.
 pub struct Scene {
@@ -86,7 +91,23 @@ pub enum Model {
         file: PathBuf,
         /// Where the azimuth starts.
         azimuth_zero: Option<[f64; 3]>,
+        /// The sense of its columns; `None`: by the kind of file.
+        columns: Option<Columns>,
     },
+}
+
+impl Model {
+    /// The value of the key `model`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Model::Uniform => "uniform",
+            Model::Hemisphere => "hemisphere",
+            Model::Overcast => "overcast",
+            Model::Cie { .. } => "cie",
+            Model::Gradient => "gradient",
+            Model::Table { .. } => "table",
+        }
+    }
 }
 
 /// The sun.
@@ -128,7 +149,8 @@ pub enum Projection {
 
 /// Reads and checks the scene file at `path`.
 pub fn read(path: &Path) -> Outcome<Scene> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::at(path, e))?;
+    let bytes = std::fs::read(path).map_err(|e| Failure::at(path, e))?;
+    let text = text(path, &bytes)?;
     let keys: Keys = toml::from_str(&text).map_err(|e| syntax(path, &text, &e))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let bands = keys.bands.unwrap_or(1);
@@ -163,14 +185,52 @@ pub fn read(path: &Path) -> Outcome<Scene> {
     })
 }
 
+/// The file's text with line ends that TOML knows.
+fn text(path: &Path, bytes: &[u8]) -> Outcome<String> {
+    let text = text_file::decode(bytes);
+    if !text.unicode {
+        let line = text_file::lines(&text.content).find(|(_, line)| !line.is_ascii()).map_or(1, |(n, _)| n);
+        return Err(Failure::at_line(path, line, "expected UTF-8 text"));
+    }
+    let content = text.content.into_owned();
+    Ok(if content.contains('\n') { content } else { content.replace('\r', "\n") })
+}
+
 /// The parser's message with the line it speaks of, in this file format's words.
 fn syntax(path: &Path, text: &str, error: &toml::de::Error) -> Failure {
     let message =
         error.message().replace("unknown field", "unknown key").replace("missing field", "missing key");
-    match error.span().and_then(|span| text.get(..span.start)) {
-        Some(before) => Failure::at_line(path, before.matches('\n').count() + 1, message),
+    let before = error.span().and_then(|span| text.get(..span.start));
+    let line = before.map(|before| before.matches('\n').count() + 1);
+    let advice = line.and_then(|line| split_name(text.lines().nth(line - 1)?)).unwrap_or_default();
+    match line {
+        Some(line) => Failure::at_line(path, line, format_args!("{message}{advice}")),
         None => Failure::at(path, message),
     }
+}
+
+/// What to write for a material's name with a point in it, which TOML takes for a table in a table.
+fn split_name(line: &str) -> Option<String> {
+    let name = line.trim().strip_prefix("[material.")?.split(']').next()?;
+    let plain = name.contains('.') && !name.contains(['"', '\'']);
+    plain.then(|| format!(" (a name with a point stands in quotes: [{}])", table(name)))
+}
+
+/// How the table of a material is written, without brackets.
+pub fn table(name: &str) -> String {
+    let bare = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    if bare {
+        return format!("material.{name}");
+    }
+    let mut quoted = String::new();
+    for c in name.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => quoted += &format!("\\u{:04X}", u32::from(c)),
+            c => quoted.push(c),
+        }
+    }
+    format!("material.\"{quoted}\"")
 }
 
 fn reference(check: &Check, values: Vec<f64>) -> Outcome<Vec<f64>> {
@@ -182,12 +242,12 @@ fn reference(check: &Check, values: Vec<f64>) -> Outcome<Vec<f64>> {
 }
 
 fn read_material(check: &Check, name: &str, keys: keys::Material) -> Outcome<Material> {
-    let key = |field: &str| format!("material.{name}.{field}");
-    let diffuse = check.spectrum(&key("diffuse"), keys.diffuse, 0.0, 1.0)?;
-    let specular = check.spectrum(&key("specular"), keys.specular, 0.0, 1.0)?;
+    let key = |field: &str| format!("{}.{field}", table(name));
+    let diffuse = check.spectrum(&key("diffuse"), keys.diffuse, 0.0, MOST_REFLECTANCE)?;
+    let specular = check.spectrum(&key("specular"), keys.specular, 0.0, MOST_REFLECTANCE)?;
     for (band, (d, s)) in diffuse.iter().zip(&specular).enumerate() {
         if d + s > MOST_REFLECTANCE {
-            let what = format!("material.{name}: diffuse + specular in band {band}");
+            let what = format!("{}: diffuse + specular in band {band}", table(name));
             return Err(check.fail(&what, "at most 1", d + s));
         }
     }
@@ -242,7 +302,7 @@ fn read_sky(check: &Check, folder: &Path, keys: keys::Sky, sun: Option<&Sun>) ->
             let file = check.required("sky.file", keys.file, "model = \"table\" needs it")?;
             let azimuth_zero =
                 keys.azimuth_zero.map(|d| check.direction("sky.azimuth_zero", d)).transpose()?;
-            Model::Table { file: folder.join(file), azimuth_zero }
+            Model::Table { file: folder.join(file), azimuth_zero, columns: keys.columns }
         }
     };
     let radiance = check.spectrum("sky.radiance", keys.radiance, 1.0, f64::INFINITY)?;
