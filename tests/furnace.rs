@@ -37,9 +37,9 @@ fn all_is(what: &str, case: &Case, (tolerance, cut): (f64, f64), camera: &Camera
     assert!(outcome.image.report.signature.projected_area > 0.0, "{what}: something is seen");
 }
 
-/// A tolerance, and the share of it that may be cut: chains below 0.05; couplings and sweeps below 0.001 each,
-/// both magnified by the bounces that follow.
-const SAMPLED: (f64, f64) = (1e-2, 0.055);
+/// A tolerance, and the share of it that may be cut: chains below 0.05, which rays beside an element's linear function
+/// meet up to a fifth more often; couplings and sweeps below 0.001 each, both magnified by the bounces that follow.
+const SAMPLED: (f64, f64) = (1e-2, 0.06);
 
 /// Nothing is cut and nothing is sampled: each facet sees the sky alone.
 const EXACT: (f64, f64) = (5e-3, 0.0);

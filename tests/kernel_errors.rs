@@ -15,6 +15,7 @@ use blik_kernel::image::{self, Target};
 use blik_kernel::light::{self, Shape};
 use blik_kernel::lobe::Lobe;
 use blik_kernel::math::Vec3;
+use blik_kernel::radiosity::straight::Straight;
 use blik_kernel::scene::{Gloss, MaterialInput, NO_NORMAL, Scene, SceneInput};
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
@@ -429,11 +430,27 @@ fn stages_of_different_scenes() {
         let all = 0..coupling.unknowns();
         let mut table = vec![7.0; all.len() * shape.stride()];
         let (scene, elements) = (few.scene(), few.elements());
-        let error =
-            light::sky_rows(scene, elements, &coupling, &checked, 1e-3, all.clone(), shape, &mut table);
+        let error = light::sky_rows(
+            scene,
+            elements,
+            &coupling,
+            (&checked, &Straight::default()),
+            1e-3,
+            all.clone(),
+            shape,
+            &mut table,
+        );
         is(error.unwrap_err(), expected, &["coupling"]);
-        let error =
-            light::sky_rows(scene, elements, &coupling, &checked, 1e-3, all.clone(), shape, &mut table[1..]);
+        let error = light::sky_rows(
+            scene,
+            elements,
+            &coupling,
+            (&checked, &Straight::default()),
+            1e-3,
+            all.clone(),
+            shape,
+            &mut table[1..],
+        );
         let (expected, given) = (table.len(), table.len() - 1);
         is(
             error.unwrap_err(),

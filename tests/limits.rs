@@ -84,7 +84,8 @@ fn without_mirrors_it_is_equation_3() {
                 let coupling = geometry.coupling().unwrap();
                 let mut factors = vec![vec![0.0; unknowns]; unknowns];
                 for (k, row) in coupling.rows(0..unknowns) {
-                    row.targets.iter().for_each(|r| factors[k][r.unknown()] += r.weight);
+                    let scale = solved.straight.scale(k, 1, &row.row);
+                    row.targets.iter().for_each(|r| factors[k][r.unknown()] += scale * r.weight);
                     assert!(
                         row.escapes.into_iter().all(|b| row.depth(b.word) == 0),
                         "no path by way of a mirror"
@@ -94,6 +95,8 @@ fn without_mirrors_it_is_equation_3() {
                     Light { sky: Some(Sky::new(&case.sky.as_ref().unwrap().input(), 1).unwrap()), sun: None };
                 let mut table = vec![0.0; 3 * unknowns];
                 let sky = light.sky.as_ref().unwrap();
+                let straight = solved.straight;
+                let sky = (sky, &straight);
                 sky_rows(scene, elements, &coupling, sky, 5e-4, 0..unknowns, shape, &mut table).unwrap();
                 let direct: Vec<f64> = table.iter().step_by(3).copied().collect();
                 let diffuse: Vec<f64> =
@@ -105,8 +108,16 @@ fn without_mirrors_it_is_equation_3() {
                 let dark = vec![0.0; unknowns];
                 let of = |table: &[f64], radiance: &[f64]| {
                     let (direct, sun) = (table, &dark[..]);
-                    let system =
-                        System { scene, elements, coupling: &coupling, light: &light, direct, sun, shape };
+                    let system = System {
+                        scene,
+                        elements,
+                        coupling: &coupling,
+                        light: &light,
+                        direct,
+                        sun,
+                        straight,
+                        shape,
+                    };
                     let (mut gathered, mut missed) = (vec![0.0; 3 * unknowns], vec![0.0; unknowns]);
                     system.gather(0..unknowns, 0, |_| radiance, &mut gathered).unwrap();
                     system.slopes(0..unknowns, &gathered, &mut missed);
@@ -119,8 +130,16 @@ fn without_mirrors_it_is_equation_3() {
                 sweeps += plain_radiosity(&factors, &direct, &diffuse, goal, &mut radiance);
                 assert_eq!(lit.report().sweeps, sweeps);
                 let (direct, sun) = (&table[..], &dark[..]);
-                let system =
-                    System { scene, elements, coupling: &coupling, light: &light, direct, sun, shape };
+                let system = System {
+                    scene,
+                    elements,
+                    coupling: &coupling,
+                    light: &light,
+                    direct,
+                    sun,
+                    straight,
+                    shape,
+                };
                 for camera in views() {
                     let image = host.image(lit, &camera, true).unwrap();
                     assert_eq!(image.pixels, image_of(lit, &system, &radiance, &camera), "bit for bit");

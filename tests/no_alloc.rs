@@ -18,6 +18,7 @@ use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Target};
 use blik_kernel::light::{self, Light, Shape};
 use blik_kernel::radiosity::System;
+use blik_kernel::radiosity::straight::Straight;
 use blik_kernel::scene::Scene;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
@@ -181,7 +182,8 @@ fn with_stages(check: impl FnOnce(&System<'_>, &Bvh<'_>, &RowSettings)) {
         let direct = vec![0.5; elements.unknowns() * shape.stride()];
         let lit = vec![0.5; elements.unknowns()];
         let (light, direct, sun) = (&light, &direct[..], &lit[..]);
-        let system = System { scene, elements, coupling: &coupling, light, direct, sun, shape };
+        let straight = Straight::default();
+        let system = System { scene, elements, coupling: &coupling, light, direct, sun, straight, shape };
         check(&system, geometry.bvh(), &RowSettings::new(scene, 5e-2, None, true, false));
     });
 }
@@ -226,12 +228,12 @@ fn coupling_and_beams_refuse_memory_that_holds_no_row() {
 #[test]
 fn light_solution_image_and_signature_refuse_tables_of_the_wrong_size() {
     with_stages(|system, bvh, _| {
-        let System { scene, elements, coupling, light, shape, .. } = *system;
+        let System { scene, elements, coupling, light, straight, shape, .. } = *system;
         let n = elements.unknowns();
         let (sky, sun) = (light.sky.as_ref().unwrap(), light.sun.as_ref().unwrap());
         let table = n * shape.stride();
         wrong("sky", table, f64::MAX, |out| {
-            light::sky_rows(scene, elements, coupling, sky, 1e-3, 0..n, shape, out).err()
+            light::sky_rows(scene, elements, coupling, (sky, &straight), 1e-3, 0..n, shape, out).err()
         });
         wrong("sun", n, f64::MAX, |out| {
             light::sun_rows(scene, bvh, elements, coupling, sun, 0..n, out).err()

@@ -180,7 +180,8 @@ impl Plan {
         let scene = &coupling.base.scene;
         let samples = given.sky.map_or(0, |sky| sky.model.samples().len());
         let light = given.light(scene.bands())?;
-        let sizes = Sizes::new(scene, &coupling.elements, &light, &coupling.settings.asked)?;
+        let sizes =
+            Sizes::new((scene, &coupling.base.bvh), &coupling.elements, &light, &coupling.settings.asked)?;
         Ok(Plan { sizes, samples })
     }
 

@@ -17,6 +17,7 @@ use crate::coupling::Block;
 use crate::coupling::element::Elements;
 use crate::radiosity::direct::Shape;
 use crate::radiosity::solution::{self, Numbers};
+use crate::radiosity::straight::{self, BY_ROWS, Straight};
 use crate::radiosity::sun_image::{self, SunImages};
 use crate::rays::bvh::Bvh;
 use crate::scene::light;
@@ -83,6 +84,8 @@ plain_struct! {
         pub half_angle_deg: f64,
         /// 1 where mirrors throw sunlight.
         pub images: u64,
+        /// 1 where outlines tell the straight sky.
+        pub straight: u64,
     }
 }
 
@@ -256,8 +259,10 @@ impl<'m> Solution<'m> {
         if let Some(sun) = &self.sun {
             (head.sun, head.sun_direction, head.half_angle_deg) = (1, sun.direction, sun.half_angle_deg);
         }
-        let solution::Solution { reference, irradiance, sun, images, variance, numbers, .. } = self.record;
+        let solution::Solution { reference, irradiance, straight, sun, images, variance, numbers, .. } =
+            self.record;
         head.images = u64::from(!images.slots.is_empty());
+        head.straight = u64::from(!straight.variance.is_empty());
         writer.put(&[head])?;
         put_bands(writer, radiance, bands)?;
         put_bands(writer, ground, bands)?;
@@ -266,6 +271,8 @@ impl<'m> Solution<'m> {
         writer.put(&[numbers])?;
         writer.put(reference)?;
         writer.put(irradiance)?;
+        writer.put(straight.values)?;
+        writer.put(straight.variance)?;
         writer.put(sun)?;
         writer.put(variance)?;
         writer.put(images.slots)?;
@@ -293,6 +300,9 @@ impl<'m> Solution<'m> {
         let numbers = view.take::<Numbers>(1)?.first().copied().ok_or(Error::Block)?;
         let reference = view.take::<f64>(bands)?;
         let irradiance = view.take::<f64>(unknowns.checked_mul(shape.stride()).ok_or(Error::Block)?)?;
+        let seen = if head.straight != 0 { unknowns } else { 0 };
+        let values = view.take::<f64>(seen.checked_mul(straight::stride(bands)).ok_or(Error::Block)?)?;
+        let straight = Straight { values, variance: view.take::<f32>(seen)? };
         let (lit, variance) = (view.take::<f64>(unknowns)?, view.take::<f32>(unknowns)?);
         let mut images = SunImages::default();
         if head.images != 0 {
@@ -301,7 +311,16 @@ impl<'m> Solution<'m> {
             let thrown = view.take::<f64>(unknowns * shape.levels * bands)?;
             images = SunImages::new(slots, thrown, sides, unknowns, shape)?;
         }
-        let record = solution::Solution { shape, reference, irradiance, sun: lit, images, variance, numbers };
+        let record = solution::Solution {
+            shape,
+            reference,
+            irradiance,
+            straight,
+            sun: lit,
+            images,
+            variance,
+            numbers,
+        };
         let solution = Solution { sky, sun, record };
         solution.check()?;
         Ok(solution)
@@ -313,6 +332,8 @@ impl<'m> Solution<'m> {
         let positive = |x: &f64| (0.0..=1e300).contains(x);
         // irradiance: pi times the largest radiance, gradients some times that
         let right = record.irradiance.iter().all(|x| x.abs() <= 1e40)
+            && record.straight.values.iter().all(|x| x.abs() <= 1e40)
+            && record.straight.variance.iter().all(|x| *x == BY_ROWS || (0.0..=f32::MAX).contains(x))
             && record.sun.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
             && record.images.thrown.iter().all(|x| (0.0..=1e40).contains(x))
             && record.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))

@@ -15,7 +15,7 @@
 //! * T. Nishita, E. Nakamae, "Continuous tone representation of three-dimensional objects", SIGGRAPH 1985:
 //!   occlusion from a point by subtracting projected polygons.
 
-mod angle;
+pub(crate) mod angle;
 mod batch;
 mod contour;
 mod convex;

@@ -22,6 +22,7 @@ use crate::coupling::subdivide::Cut;
 use crate::coupling::{Block, Coupling};
 use crate::radiosity::direct::Shape;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize};
+use crate::radiosity::straight::Straight;
 use crate::radiosity::sun_image::SunImages;
 use crate::rays::bvh::Bvh;
 use crate::scene::light::{self, Light};
@@ -143,6 +144,8 @@ pub struct Lit<'g> {
 struct Tables {
     reference: Vec<f64>,
     irradiance: Vec<f64>,
+    straight: Vec<f64>,
+    straight_variance: Vec<f32>,
     sun: Vec<f64>,
     slots: Vec<u64>,
     thrown: Vec<f64>,
@@ -154,6 +157,8 @@ impl Tables {
         Tables {
             reference: std::vec![0.0; size.shape.bands],
             irradiance: std::vec![0.0; size.table()],
+            straight: std::vec![0.0; size.straight().0],
+            straight_variance: std::vec![0.0; size.straight().1],
             sun: std::vec![0.0; size.unknowns],
             slots: std::vec![0; size.places],
             thrown: std::vec![0.0; size.thrown()],
@@ -165,6 +170,8 @@ impl Tables {
         SolutionMemory {
             reference: &mut self.reference,
             irradiance: &mut self.irradiance,
+            straight: &mut self.straight,
+            straight_variance: &mut self.straight_variance,
             sun: &mut self.sun,
             slots: &mut self.slots,
             thrown: &mut self.thrown,
@@ -303,7 +310,7 @@ impl Host {
         let light = Light::new(sky, sun, bands)?;
         let coupling = geometry.coupling()?;
         let lighting = Lighting { scene, bvh, elements, coupling: &coupling, light: &light, settings };
-        let sizes = Sizes::new(scene, elements, &light, settings)?;
+        let sizes = Sizes::new((scene, bvh), elements, &light, settings)?;
         let size = sizes.solution;
         let mut tables = Tables::new(&size);
         let mut scratch = Memory::new(sizes.scratch().bytes()?);
@@ -464,11 +471,13 @@ impl Lit<'_> {
 
     /// The record of the solution.
     pub fn solution(&self) -> Solution<'_> {
-        let Tables { reference, irradiance, sun, slots, thrown, variance } = &self.tables;
+        let Tables { reference, irradiance, straight, straight_variance, sun, slots, thrown, variance } =
+            &self.tables;
         Solution {
             shape: self.shape,
             reference,
             irradiance,
+            straight: Straight { values: straight, variance: straight_variance },
             sun,
             images: SunImages { slots, thrown },
             variance,

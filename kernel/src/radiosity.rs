@@ -10,6 +10,7 @@ pub mod direct;
 pub mod limits;
 pub mod solution;
 pub mod solver;
+pub mod straight;
 pub mod sun_image;
 
 use crate::base::error::Error;
@@ -18,6 +19,7 @@ use crate::base::math::{FRAC_1_PI, PI, fabs, sqrt};
 use crate::coupling::element::Elements;
 use crate::coupling::{Coupling, RowView, TRACED};
 use crate::radiosity::direct::Shape;
+use crate::radiosity::straight::Straight;
 use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
@@ -37,6 +39,8 @@ pub struct System<'a> {
     pub direct: &'a [f64],
     /// Mean of cos V of the sun, one value an unknown.
     pub sun: &'a [f64],
+    /// The part of `direct` that outlines tell.
+    pub straight: Straight<'a>,
     /// Shape of `direct`.
     pub shape: Shape,
 }
@@ -50,8 +54,9 @@ impl System<'_> {
         for (unknown, row) in self.coupling.rows(range) {
             let diffuse = self.scene.diffuse(self.material(unknown));
             row.sums(sums);
+            let scale = self.scale(unknown, &row);
             for (sum, rho) in sums.iter().zip(diffuse) {
-                largest = f64::max(largest, sum * rho);
+                largest = f64::max(largest, scale * sum * rho);
             }
         }
         largest
@@ -89,8 +94,9 @@ impl System<'_> {
             let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
             row.gather(from, sums);
             let direct = self.direct.part(self.shape.at(unknown, 0));
+            let scale = PI * self.scale(unknown, &row);
             for (band, (out, &bounced)) in out.iter_mut().zip(&*sums).enumerate() {
-                let mut irradiance = direct.at(band) + PI * bounced;
+                let mut irradiance = direct.at(band) + scale * bounced;
                 if let Some(sun) = &self.light.sun {
                     irradiance += self.sun.at(unknown) * sun.irradiance(band);
                 }
@@ -115,7 +121,8 @@ impl System<'_> {
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
             row.sums(out);
             let diffuse = self.scene.diffuse(self.material(unknown));
-            out.iter_mut().zip(diffuse).for_each(|(out, rho)| *out = 1.0 - rho * *out);
+            let scale = self.scale(unknown, &row);
+            out.iter_mut().zip(diffuse).for_each(|(out, rho)| *out = 1.0 - scale * rho * *out);
         }
     }
 
@@ -139,8 +146,9 @@ impl System<'_> {
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
             let diffuse = self.scene.diffuse(self.material(unknown));
             row.gather(from, sums);
+            let scale = self.scale(unknown, &row);
             for (band, (out, &bounced)) in out.iter_mut().zip(&*sums).enumerate() {
-                let new = 1.0 + diffuse.at(band) * bounced;
+                let new = 1.0 + scale * diffuse.at(band) * bounced;
                 increase = increase.max(new - from.at(unknown * bands + band));
                 *out = relax(*out, new, relaxation);
             }
@@ -176,8 +184,11 @@ impl System<'_> {
             let (Some(mean), Some(first), Some(second)) = (parts.next(), parts.next(), parts.next()) else {
                 continue;
             };
+            let scale = PI * self.scale(unknown, &row);
             let blocked = row.row.blocked;
             let share = if blocked > 0.5 { 1.0 - blocked } else { blocked };
+            // the sky's part, where rays tell it
+            let share = if self.straight.knows(unknown) { 0.0 } else { share };
             square.iter_mut().zip(&sky).for_each(|(square, l)| *square = (PI * l) * (PI * l) * share);
             if let ([mean], [first], [second], [square]) =
                 (&mut *mean, &mut *first, &mut *second, &mut *square)
@@ -186,7 +197,7 @@ impl System<'_> {
                 let seen = radiance(0);
                 for record in row.targets {
                     let product = row.products(record.word()).at(0);
-                    let l = PI * product * seen.at(record.unknown());
+                    let l = scale * product * seen.at(record.unknown());
                     *mean += l * record.weight;
                     *first += l * f64::from(record.gradient[0]);
                     *second += l * f64::from(record.gradient[1]);
@@ -194,18 +205,25 @@ impl System<'_> {
                 }
             } else {
                 let sums = [&mut *mean, &mut *first, &mut *second, &mut *square];
-                self.add_targets(&row, level, &radiance, sums);
+                self.add_targets((&row, scale), level, &radiance, sums);
+            }
+            let known = self.straight.blocked(unknown, bands, &row);
+            if let Some((blocked, short)) = known {
+                let direct = self.direct.part(self.shape.at(unknown, level));
+                let sums = [&mut *mean, &mut *first, &mut *second, &mut *square];
+                sharpen(direct, sums, (blocked, short), row.row.rays);
+            } else {
+                damp(first, second, square, row.row.rays);
             }
             mean.iter_mut().for_each(|mean| *mean = mean.max(0.0));
-            damp(first, second, square, row.row.rays);
         }
         Ok(())
     }
 
-    /// Adds to mean, gradients and mean square of a row's irradiance what its targets send.
+    /// Adds to mean, gradients and mean square of a row's irradiance what its targets send, times `scale`.
     fn add_targets<'x>(
         &self,
-        row: &RowView<'_>,
+        (row, scale): (&RowView<'_>, f64),
         level: usize,
         radiance: &impl Fn(usize) -> &'x [f64],
         [mean, first, second, square]: [&mut [f64]; 4],
@@ -223,7 +241,7 @@ impl System<'_> {
             let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut *square);
             let terms = row.products(record.word()).iter().zip(seen);
             for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
-                let l = PI * product * seen;
+                let l = scale * product * seen;
                 *mean += l * record.weight;
                 *first += l * g[0];
                 *second += l * g[1];
@@ -236,8 +254,9 @@ impl System<'_> {
     /// slopes of what all unknowns send, written to `out`, one value per band. `irradiance` is the gathered table.
     pub fn slopes(&self, range: Range<usize>, irradiance: &[f64], out: &mut [f64]) {
         let bands = self.shape.bands;
-        for ((_, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
+        for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
             out.fill(0.0);
+            let scale = self.scale(unknown, &row);
             for record in row.targets {
                 let seen = irradiance.part(self.shape.at(record.unknown(), 0));
                 let diffuse = self.scene.diffuse(self.material(record.unknown()));
@@ -245,7 +264,7 @@ impl System<'_> {
                 let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record.word()));
                 for (out, (((a, b), rho), product)) in out.iter_mut().zip(slopes) {
                     let [at, bt] = record.moment.map(f64::from);
-                    *out += product * rho * (a * at + b * bt);
+                    *out += scale * product * rho * (a * at + b * bt);
                 }
             }
         }
@@ -263,6 +282,26 @@ impl System<'_> {
                     let value = if band < self.shape.bands { table.at(from) } else { 0.0 };
                     table.set(to, value);
                 }
+            }
+        }
+    }
+
+    /// The same of the straight sky, in its table.
+    pub fn extend_straight(&self, values: &mut [f64], variance: &mut [f32]) {
+        let stride = straight::stride(self.shape.bands);
+        if values.is_empty() {
+            return;
+        }
+        for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
+            let Some(near) = self.stand_in(unknown, &row) else { continue };
+            variance.set(unknown, variance.at(near));
+            for band in 0..stride {
+                let value = if band < self.shape.bands || band + 3 == stride {
+                    values.at(near * stride + band)
+                } else {
+                    0.0
+                };
+                values.set(unknown * stride + band, value);
             }
         }
     }
@@ -311,6 +350,12 @@ impl System<'_> {
         }
     }
 
+    /// By what the entries of a row count.
+    #[inline]
+    fn scale(&self, unknown: usize, row: &RowView<'_>) -> f64 {
+        self.straight.scale(unknown, self.shape.bands, &row.row)
+    }
+
     fn material(&self, unknown: usize) -> usize {
         self.scene.material(self.elements.facet_of(unknown).0)
     }
@@ -343,6 +388,35 @@ fn damp(first: &mut [f64], second: &mut [f64], square: &[f64], rays: u32) {
         let keep = if signal > noise { 1.0 - noise / signal } else { 0.0 };
         *first = a * keep;
         *second = b * keep;
+    }
+}
+
+/// Corrects the gradients of what a row sees (`sums` less `direct`) by those of what is known to be blocked: what is met has
+/// the same gradients as that, but for how its radiances differ from their mean. What is left of noise is damped.
+fn sharpen(
+    direct: &[f64],
+    [mean, first, second, square]: [&mut [f64]; 4],
+    (blocked, short): ([f64; 3], [f64; 2]),
+    rays: u32,
+) {
+    let bands = mean.len();
+    for band in 0..bands {
+        // over the mean radiance of what is met
+        let seen = mean.at(band) - direct.at(band);
+        let l = seen / blocked[0];
+        let mut parts = [0.0; 2];
+        for (k, (gradient, part)) in [&mut *first, &mut *second].into_iter().zip(&mut parts).enumerate() {
+            let own = direct.at((k + 1) * bands + band);
+            // exact for one radiance everywhere
+            *part = own + l * blocked[k + 1];
+            let rest = gradient.at(band) - own - l * (blocked[k + 1] - short[k]);
+            gradient.set(band, rest);
+        }
+        let spread = [(square.at(band) - l * seen).max(0.0)];
+        let [mut a, mut b] = [[first.at(band)], [second.at(band)]];
+        damp(&mut a, &mut b, &spread, rays);
+        first.set(band, a[0] + parts[0]);
+        second.set(band, b[0] + parts[1]);
     }
 }
 

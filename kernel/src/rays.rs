@@ -2,5 +2,6 @@
 
 pub mod bvh;
 pub(crate) mod inside;
+pub mod outline;
 pub mod ray;
 pub mod surface;

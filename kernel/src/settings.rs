@@ -97,6 +97,12 @@ pub fn sky_accuracy(tolerance: f64) -> f64 {
     (0.05 * tolerance).max(1e-9)
 }
 
+/// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the tolerance by
+/// what it adds to the element's radiance.
+pub fn straight_goal(scene: &Scene<'_>, tolerance: f64) -> f64 {
+    0.5 * tolerance / scene.largest_diffuse().max(0.1)
+}
+
 /// Orders of reflection are kept apart only where their number is bounded, and small; one level counts all.
 pub fn shape(max_bounces: Option<u32>, bands: usize) -> Shape {
     let levels = max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);

@@ -8,6 +8,7 @@ mod beams;
 mod geometry;
 mod light;
 mod solve;
+mod straight;
 
 pub use beams::Beams;
 pub use geometry::{BlockMemory, BlockPlace, CouplingRows, least_bytes, places, refine};

@@ -113,13 +113,13 @@ impl Workspace {
             // solutions of small rooms: sixteen values of each unknown and band, and those of the images of the sun
             tables: Tables {
                 kept: vec![0xa5; 64 * (8 * bands * unknowns + 2 * facets) + 65536],
-                scratch: vec![0xa5; 256 * bands * unknowns + 4096],
+                scratch: vec![0xa5; 256 * bands * unknowns + (4 << 20)],
                 beams: vec![0xa5; PARTS * block],
                 bits: vec![0; 8 * bands * unknowns],
                 used: 0,
             },
             view: Outputs {
-                scratch: vec![0xa5; 1 << 20],
+                scratch: vec![0xa5; 4 << 20],
                 // rows of cells, and of facets that may show glints
                 sums: vec![Sums::ZERO; CELLS + facets],
                 pixels: image.clone(),
@@ -251,7 +251,7 @@ pub fn run(
         settings: &asked,
     };
     let Tables { kept, scratch, beams: beam_memory, bits, used } = &mut work.tables;
-    let sizes = Sizes::new(&scene, &elements, &light, &asked)?;
+    let sizes = Sizes::new((&scene, &bvh), &elements, &light, &asked)?;
     let needed = sizes.solution.need().bytes()?;
     let mut memory = sizes.solution.take(&mut Arena::new(&mut kept[..needed], needed)?)?;
     let needed = sizes.scratch().bytes()?;

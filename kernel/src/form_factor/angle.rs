@@ -42,7 +42,7 @@ pub(super) fn angle(y: f64, x: f64) -> f64 {
 
 /// [`angle`] in explicit lanes.
 #[inline(always)]
-pub(super) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
+pub(crate) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
     let (zero, least) = (lanes.all(0.0), lanes.all(f64::MIN_POSITIVE));
     let wide = x.abs();
     let (steep, slanted) = (y.gt(lanes.all(HIGH) * wide), y.gt(lanes.all(LOW) * wide));

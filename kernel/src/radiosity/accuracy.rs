@@ -13,6 +13,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces, span};
 use crate::base::math::narrow;
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
+use crate::coupling::word::EMPTY;
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::radiosity::System;
 use crate::scene::sky::Sky;
@@ -90,11 +91,11 @@ impl LaneTask for Differences<'_, '_> {
         let mut checks = [[0.0; 4]; MAX_BANDS];
         let mut light = [0.0; MAX_BANDS];
         let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
-        for ((_, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
+        for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
             sums.fill([0.0; 4]);
             add_targets(&row, radiance, sums);
             if let Some(sky) = &system.light.sky {
-                add_sky(&row, sky, lanes, light, sums);
+                add_sky(&row, (sky, system.straight.knows(unknown)), lanes, light, sums);
             }
             for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
                 let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
@@ -195,10 +196,19 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     }
 }
 
-/// `light` has room for a value of each band.
+/// `light` has room for a value of each band; what is seen straight may be `known`.
 #[inline(always)]
-fn add_sky<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [[f64; 4]]) {
+fn add_sky<L: Lanes>(
+    row: &RowView<'_>,
+    (sky, known): (&Sky<'_>, bool),
+    lanes: L,
+    light: &mut [f64],
+    sums: &mut [[f64; 4]],
+) {
     for bundle in row.escapes {
+        if known && matches!(bundle.word, BLOCKED | EMPTY) {
+            continue;
+        }
         sky.sum(lanes, bundle.packed, light);
         match bundle.word {
             BLOCKED if row.row.state != ENCLOSED => light.iter_mut().for_each(|l| *l = -*l),

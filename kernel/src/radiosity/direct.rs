@@ -9,7 +9,9 @@ use crate::base::math::{PI, Vec3};
 use crate::base::qmc::{Sequence, hash2, triangle};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
+use crate::coupling::word::EMPTY;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
+use crate::radiosity::straight::{Blocked, Straight};
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
@@ -67,7 +69,7 @@ pub fn sky_rows(
     scene: &Scene<'_>,
     elements: &Elements<'_>,
     coupling: &Coupling<'_>,
-    sky: &Sky<'_>,
+    (sky, straight): (&Sky<'_>, &Straight<'_>),
     relative_error: f64,
     range: Range<usize>,
     shape: Shape,
@@ -82,7 +84,7 @@ pub fn sky_rows(
     }
     simd::run_lanes(
         Isa::detect(),
-        SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out },
+        SkyRows { scene, elements, coupling, sky, straight, relative_error, range, shape, out },
     );
     Ok(())
 }
@@ -93,6 +95,7 @@ struct SkyRows<'a, 'o> {
     elements: &'a Elements<'a>,
     coupling: &'a Coupling<'a>,
     sky: &'a Sky<'a>,
+    straight: &'a Straight<'a>,
     relative_error: f64,
     range: Range<usize>,
     shape: Shape,
@@ -104,7 +107,7 @@ impl LaneTask for SkyRows<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let SkyRows { scene, elements, coupling, sky, relative_error, range, shape, out } = self;
+        let SkyRows { scene, elements, coupling, sky, straight, relative_error, range, shape, out } = self;
         let bands = shape.bands.clamp(1, MAX_BANDS);
         let (mut unobstructed, mut sum) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
         let (unobstructed, sum) = (unobstructed.head_mut(bands), sum.head_mut(bands));
@@ -114,7 +117,10 @@ impl LaneTask for SkyRows<'_, '_> {
             if row.row.state == ABSENT {
                 continue;
             }
-            if row.row.state != ENCLOSED {
+            let known = straight.of(unknown, bands);
+            if let Some((known, _)) = known {
+                pieces(values, 3 * bands).for_each(|part| copy(part, known));
+            } else if row.row.state != ENCLOSED {
                 let own = elements.facet_of(unknown);
                 if of != Some(own) {
                     sky.irradiance(scene.side_normal(own.0, own.1), relative_error, unobstructed);
@@ -122,19 +128,21 @@ impl LaneTask for SkyRows<'_, '_> {
                 }
                 pieces(values, 3 * bands).for_each(|part| copy(part, unobstructed));
             }
-            add_escapes(&row, sky, lanes, shape, sum, values);
+            let scale = known.map(|_| straight.scale(unknown, bands, &row.row));
+            let blocked = straight.blocked(unknown, bands, &row);
+            add_escapes(&row, (sky, scale, blocked), lanes, shape, sum, values);
             let means = pieces(values, 3 * bands).flat_map(|part| part.head_mut(bands));
             means.for_each(|e| *e = e.max(0.0));
         }
     }
 }
 
-/// Takes off what is blocked or adds what is open, and adds what escapes by way of mirrors; `sum` has room for a value
+/// Takes off what is blocked or adds what is open, where no `scale` says that it is known, and adds what escapes by way of mirrors; `sum` has room for a value
 /// of each band.
 #[inline(always)]
 fn add_escapes<L: Lanes>(
     row: &RowView<'_>,
-    sky: &Sky<'_>,
+    (sky, scale, blocked): (&Sky<'_>, Option<f64>, Option<Blocked>),
     lanes: L,
     shape: Shape,
     sum: &mut [f64],
@@ -142,13 +150,22 @@ fn add_escapes<L: Lanes>(
 ) {
     let bands = sum.len();
     for bundle in row.escapes {
+        if scale.is_some() && matches!(bundle.word, BLOCKED | EMPTY) {
+            continue;
+        }
         sky.sum(lanes, bundle.packed, sum);
+        let pi = PI * scale.unwrap_or(1.0);
         match bundle.word {
             BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
-            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= PI * product),
+            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= pi * product),
         }
         let depth = row.depth(bundle.word);
-        let [a, b] = bundle.gradient.map(f64::from);
+        let [mut a, mut b] = bundle.gradient.map(f64::from);
+        if let Some(([whole, ..], short)) = blocked {
+            // as much as it fills of what is blocked
+            let share = bundle.weight / whole;
+            (a, b) = (a + share * short[0], b + share * short[1]);
+        }
         for (_, part) in
             pieces(values, 3 * bands).enumerate().filter(|(level, _)| shape.counts(depth, *level))
         {

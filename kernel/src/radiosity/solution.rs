@@ -3,6 +3,7 @@
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
 use crate::radiosity::direct::Shape;
+use crate::radiosity::straight::{self, Straight};
 use crate::radiosity::sun_image::SunImages;
 
 /// A scene under one light, solved.
@@ -14,6 +15,8 @@ pub struct Solution<'m> {
     pub reference: &'m [f64],
     /// Mean and gradients of each unknown's irradiance, without the sun's direct part and that of its images.
     pub irradiance: &'m [f64],
+    /// The part of it that is the sky seen straight, where outlines tell it.
+    pub straight: Straight<'m>,
     /// Mean of cos V of the sun over each unknown.
     pub sun: &'m [f64],
     /// Images of the sun in flat mirrors.
@@ -28,6 +31,8 @@ impl Solution<'_> {
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         size_of_val(self.irradiance)
+            + size_of_val(self.straight.values)
+            + size_of_val(self.straight.variance)
             + size_of_val(self.sun)
             + size_of_val(self.variance)
             + self.images.memory()
@@ -56,6 +61,10 @@ pub struct SolutionMemory<'m> {
     pub reference: &'m mut [f64],
     /// As [`Solution::irradiance`].
     pub irradiance: &'m mut [f64],
+    /// As [`Straight::values`].
+    pub straight: &'m mut [f64],
+    /// As [`Straight::variance`].
+    pub straight_variance: &'m mut [f32],
     /// As [`Solution::sun`].
     pub sun: &'m mut [f64],
     /// As [`SunImages::slots`].
@@ -75,6 +84,8 @@ pub struct SolutionSize {
     pub unknowns: usize,
     /// Places for images of the sun; 0 where no mirror throws sunlight.
     pub places: usize,
+    /// Whether outlines tell the straight sky.
+    pub straight: bool,
 }
 
 impl SolutionSize {
@@ -93,11 +104,19 @@ impl SolutionSize {
         if self.places > 0 { self.values() * self.shape.levels } else { 0 }
     }
 
+    /// Values and variances of the straight sky.
+    pub fn straight(&self) -> (usize, usize) {
+        let values = straight::stride(self.shape.bands) * self.unknowns;
+        if self.straight { (values, self.unknowns) } else { (0, 0) }
+    }
+
     /// Bytes of [`SolutionMemory`].
     pub fn need(&self) -> Need {
         Need::new()
             .and::<f64>(self.shape.bands)
             .and::<f64>(self.table())
+            .and::<f64>(self.straight().0)
+            .and::<f32>(self.straight().1)
             .and::<f64>(self.unknowns)
             .and::<u64>(self.places)
             .and::<f64>(self.thrown())
@@ -109,6 +128,8 @@ impl SolutionSize {
         Ok(SolutionMemory {
             reference: arena.take(self.shape.bands)?,
             irradiance: arena.take(self.table())?,
+            straight: arena.take(self.straight().0)?,
+            straight_variance: arena.take(self.straight().1)?,
             sun: arena.take(self.unknowns)?,
             slots: arena.take(self.places)?,
             thrown: arena.take(self.thrown())?,

@@ -21,6 +21,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, fabs};
 use crate::base::simd::Isa;
+use crate::rays::outline::Outlines;
 use crate::rays::ray::{self, Hit, Ray};
 
 use build::{Binary, Facets};
@@ -88,6 +89,7 @@ pub struct Bvh<'m> {
     scale: f64,
     isa: Isa,
     external: Option<External<'m>>,
+    outlines: Outlines<'m>,
 }
 
 /// How many of each thing `facets` facets can need.
@@ -114,25 +116,26 @@ impl Size {
         Ok(Size { nodes, packets, shared })
     }
 
-    fn bytes(&self) -> Result<usize, Error> {
-        Need::new()
+    fn bytes(&self, facets: usize) -> Result<usize, Error> {
+        let need = Need::new()
             .and::<Boxes>(self.nodes)
             .and::<[u32; 8]>(self.nodes)
             .and::<[u32; LANES]>(self.packets)
             .and::<Packet>(self.packets)
             .and::<Slack>(self.packets)
-            .and::<u8>(self.shared)
-            .bytes()
+            .and::<u8>(self.shared);
+        Outlines::need(need, facets).bytes()
     }
 }
 
 impl<'m> Bvh<'m> {
-    /// Bytes of memory that a tree over `facets` facets needs at most, building included: some 220 a facet.
+    /// Bytes of memory that a tree over `facets` facets needs at most, building included: some 220 a facet, and
+    /// 370 for outlines.
     ///
     /// # Errors
     /// [`Error::TooMany`] for 2^28 facets and more.
     pub fn bytes(facets: usize) -> Result<usize, Error> {
-        Size::of(facets)?.bytes()
+        Size::of(facets)?.bytes(facets)
     }
 
     /// Builds the tree with the kernel's own builder: no heap, binned surface area heuristic.
@@ -175,7 +178,7 @@ impl<'m> Bvh<'m> {
             return Err(Error::Length { what: "areas", expected: corners.len(), given: areas.len() });
         }
         let size = Size::of(corners.len())?;
-        let mut arena = Arena::new(memory, size.bytes()?)?;
+        let mut arena = Arena::new(memory, size.bytes(corners.len())?)?;
         let (low, high) = extent(corners, areas)?;
         let scale = low.abs().max(high.abs()).max_element();
         let boxes = arena.take::<Boxes>(size.nodes)?;
@@ -213,6 +216,7 @@ impl<'m> Bvh<'m> {
             scale,
             isa,
             external: None,
+            outlines: Outlines::new(corners, areas, &mut arena)?,
         })
     }
 
@@ -220,6 +224,12 @@ impl<'m> Bvh<'m> {
     /// an answer names a facet that the ray does not meet, the tree is asked.
     pub fn with_intersector(self, tracer: Option<&'m dyn Intersector>, corners: &'m [[Vec3; 3]]) -> Bvh<'m> {
         Bvh { external: tracer.map(|tracer| External { tracer, corners }), ..self }
+    }
+
+    /// The mesh's outlines, if any.
+    #[inline]
+    pub fn outlines(&self) -> &Outlines<'m> {
+        &self.outlines
     }
 
     /// The first facet that the ray meets: least t with `0 < t < t_max`, where facets coincide a front before a back, then
@@ -286,6 +296,7 @@ impl<'m> Bvh<'m> {
             + size_of_val(self.packets)
             + size_of_val(self.slacks)
             + size_of_val(self.solids)
+            + self.outlines.memory()
     }
 }
 

@@ -236,6 +236,28 @@ impl<'a> Sky<'a> {
         }
     }
 
+    /// Whether the radiance is a linear function of the direction's height above the horizon, on either side of it: then
+    /// [`Sky::open_irradiance`] tells the irradiance where a part of the sky is hidden.
+    pub fn is_linear(&self) -> bool {
+        !matches!(self.model, Model::Cie(_) | Model::Table(_))
+    }
+
+    /// Irradiance per band where only a part of the sky is open, into `out`: by the integrals of the cosine over what is
+    /// open above and below the horizon, and by those of cosine times height. Zero where the sky is not linear.
+    pub fn open_irradiance(&self, (above, below): (f64, f64), (high, low): (f64, f64), out: &mut [f64]) {
+        let whole = above + below;
+        match &self.model {
+            Model::Uniform => self.combine(whole, 0.0, out),
+            Model::Hemisphere => self.combine(above, below, out),
+            Model::Overcast => self.combine((above + 2.0 * high) / 3.0, below, out),
+            Model::Gradient => {
+                let tilt = 0.5 * (high + low);
+                self.combine(0.5 * whole + tilt, 0.5 * whole - tilt, out);
+            }
+            Model::Cie(_) | Model::Table(_) => out.fill(0.0),
+        }
+    }
+
     /// Upper bound of the radiance per band over all directions, into `out`: attained but for `cie`, where it
     /// is the product of the largest indicatrix and the largest gradation. Reads the whole of a table.
     pub fn largest_radiance(&self, out: &mut [f64]) {

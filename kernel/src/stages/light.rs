@@ -11,6 +11,7 @@ use crate::radiosity::direct::{self, Shape};
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Solution, SolutionMemory, SolutionSize};
 use crate::radiosity::solver;
+use crate::radiosity::straight::{self, Straight};
 use crate::radiosity::sun_image::{self, SPREAD};
 use crate::rays::bvh::Bvh;
 use crate::scene::Scene;
@@ -46,6 +47,8 @@ pub struct Sizes {
     orders: usize,
     /// Bytes of a few rows of beams.
     beams: usize,
+    /// Bytes in which the straight sky is looked at.
+    lookers: usize,
 }
 
 /// Memory of a light's stages beside the solution's, from [`Sizes::scratch`].
@@ -61,6 +64,7 @@ pub struct Scratch<'m> {
     /// Bands, as bits, that emission alone lights and for which the caller gave no reference radiance: it follows from the
     /// solution.
     pub(super) dark: u64,
+    pub(super) lookers: &'m mut [u8],
 }
 
 /// How a scene's mirrors throw a light's sun; `None` where there are no such beams.
@@ -76,7 +80,7 @@ pub(super) fn beam_settings(
 impl Sizes {
     /// Those of a scene under a light.
     pub fn new(
-        scene: &Scene<'_>,
+        (scene, bvh): (&Scene<'_>, &Bvh<'_>),
         elements: &Elements<'_>,
         light: &Light<'_>,
         settings: &Settings,
@@ -88,11 +92,13 @@ impl Sizes {
             beams = sink::bytes(16, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
             places = sun_image::places(elements.facet_sides());
         }
+        let straight = light.sky.as_ref().is_some_and(|sky| straight::basis(bvh, sky).is_some());
         let sweeps = || 2 + solver::kept(scene, tolerance, max_bounces);
         Ok(Sizes {
-            solution: SolutionSize { shape, unknowns: elements.unknowns(), places },
+            solution: SolutionSize { shape, unknowns: elements.unknowns(), places, straight },
             orders: if shape.levels == 1 { sweeps() } else { shape.levels + 1 },
             beams,
+            lookers: if straight { super::straight::bytes(scene.bands())? } else { 0 },
         })
     }
 
@@ -105,6 +111,7 @@ impl Sizes {
             .and::<Own>(values)
             .and::<f32>(2 * values)
             .and::<f32>(self.spread())
+            .and::<u8>(self.lookers)
     }
 
     /// Values of [`Scratch::spread`].
@@ -122,6 +129,7 @@ impl Sizes {
             carried: arena.take(2 * values)?,
             spread: arena.take(self.spread())?,
             dark: 0,
+            lookers: arena.take(self.lookers)?,
         })
     }
 
@@ -162,8 +170,11 @@ impl Lighting<'_> {
         match &light.sky {
             None => scratch.direct.fill(0.0),
             Some(sky) => {
+                super::straight::fill(self, memory, scratch, run)?;
+                let straight = Straight { values: memory.straight, variance: memory.straight_variance };
                 let accuracy = settings::sky_accuracy(settings.image_tolerance);
                 run.rows(scratch.direct, shape.stride(), SHARES[0], |range, out| {
+                    let sky = (sky, &straight);
                     direct::sky_rows(scene, elements, coupling, sky, accuracy, range, shape, out)
                 })?;
             }

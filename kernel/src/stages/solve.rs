@@ -10,6 +10,7 @@ use crate::radiosity::direct;
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory};
 use crate::radiosity::solver::{History, Solver};
+use crate::radiosity::straight::Straight;
 use crate::radiosity::sun_image::{self, SPREAD, SunImages};
 use crate::settings::Settings;
 use core::ops::Range;
@@ -23,12 +24,14 @@ pub(super) fn solve<'m, X: Executor>(
     run: &mut X,
 ) -> Result<Solution<'m>, X::Error> {
     let Lighting { scene, elements, coupling, light, settings, .. } = *of;
-    let SolutionMemory { reference, irradiance, sun, slots, thrown, variance } = memory;
+    let SolutionMemory { reference, irradiance, straight, straight_variance, sun, slots, thrown, variance } =
+        memory;
     let (sun, images) = (&*sun, SunImages { slots, thrown });
     let shape = crate::settings::shape(settings.max_bounces, scene.bands());
-    let Scratch { direct, orders, own, carried, spread, dark } = scratch;
+    let Scratch { direct, orders, own, carried, spread, dark, .. } = scratch;
     let size = elements.unknowns() * shape.bands;
-    let system = System { scene, elements, coupling, light, direct: &[], sun, shape };
+    let seen = Straight { values: straight, variance: straight_variance };
+    let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
     let (mut before, mut bounds) = (0, None);
     if shape.levels == 1 {
         let first = Solve { system: System { direct, ..system }, settings, reference: &*reference };
@@ -66,19 +69,24 @@ pub(super) fn solve<'m, X: Executor>(
         let known = images.are_known(elements.facet_side(unknown));
         *variance += narrow(sun_image::variance(spread, known));
     }
+    let numbers = Numbers {
+        brightest: limits::brightest(scene, light, reference, radiance),
+        solver: sweeps.map_or(0.0, |s| s.error),
+        sweeps: sweeps.map_or(shape.levels as u64, |s| u64::from(before + s.done)),
+        sun_rays,
+    };
+    let seen = Straight::default();
+    let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
+    system.extend_straight(straight, straight_variance);
     Ok(Solution {
         shape,
         reference,
         irradiance,
+        straight: Straight { values: straight, variance: straight_variance },
         sun,
         images,
         variance,
-        numbers: Numbers {
-            brightest: limits::brightest(scene, light, reference, radiance),
-            solver: sweeps.map_or(0.0, |s| s.error),
-            sweeps: sweeps.map_or(shape.levels as u64, |s| u64::from(before + s.done)),
-            sun_rays,
-        },
+        numbers,
     })
 }
 

@@ -4,12 +4,14 @@
 mod crowd;
 mod gather;
 mod outlook;
+mod straight;
 mod sunlight;
 
 use crowd::{CROWDED, Surroundings};
 pub(crate) use gather::GATHERS;
 use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
+use straight::OpenAt;
 
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut, copy};
@@ -707,16 +709,28 @@ impl Solved<'_> {
         {
             variance = variance.max(CROWDED * CROWDED);
         }
+        let open = if leg.gathered.is_some() {
+            self.open_at(surface, unknown, weight, local, how.outlook)
+        } else {
+            None
+        };
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {
-            let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors };
+            let open = open.as_ref();
+            let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors, open };
             if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
                 (correction, variance) = (near, left);
             }
         }
+        variance += match &open {
+            Some(open) => open.variance,
+            None => self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance),
+        };
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
-            let mut irradiance = (linear(values, bands, local, band) + correction.at(band)).max(0.0);
+            let mut irradiance = held(values, bands, local, open.as_ref(), band);
+            irradiance = (irradiance + correction.at(band)).max(0.0);
+            irradiance += open.as_ref().map_or(0.0, |open| open.irradiance.at(band));
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
@@ -729,8 +743,19 @@ impl Solved<'_> {
     }
 }
 
-/// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates.
+/// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates, less what they
+/// hold of the straight sky where that is known at the point.
+#[inline(always)]
+fn held(values: &[f64], bands: usize, local: Local, open: Option<&OpenAt<'_>>, band: usize) -> f64 {
+    let all = linear(values, bands, local, band);
+    match open {
+        Some(open) => open.ratio * (all - linear(open.held, bands, local, band)).max(0.0),
+        None => all.max(0.0),
+    }
+}
+
+/// A linear function of one band by its mean and gradients.
 #[inline(always)]
 fn linear(values: &[f64], bands: usize, (a, b): Local, band: usize) -> f64 {
-    (values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band)).max(0.0)
+    values.at(band) + a * values.at(bands + band) + b * values.at(2 * bands + band)
 }

@@ -9,6 +9,7 @@ use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::{clamp, fabs, floor, narrow, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::rays::bvh::AnswerBuffer;
+use crate::rays::outline::Candidates;
 use crate::rays::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::{Camera, Sampling};
@@ -74,7 +75,7 @@ pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let width = camera.columns() + 2;
     let need = Need::new().and::<f64>(3 * width * (3 * bands + NOTES)).and::<f64>(work(bands));
     let need = need.and::<Board>(1).and::<Way>(Outlook::ROOM);
-    Items::need(need, width, DRAWN).bytes()
+    Candidates::need(Items::need(need, width, DRAWN), KEPT).bytes()
 }
 
 /// Rows of one piece of an image of so many, for who shares them out: few enough to balance, enough to be drawn together;
@@ -82,6 +83,9 @@ pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
 pub fn piece(rows: usize) -> usize {
     rows.div_ceil(128).max(DRAWN)
 }
+
+/// Facets about which much stands whose outlines are remembered.
+const KEPT: usize = 8;
 
 /// Rows that are drawn together.
 const DRAWN: usize = 8;
@@ -185,6 +189,7 @@ pub fn rows(
     board.work.gathered.start();
     let ways = arena.take::<Way>(Outlook::ROOM)?;
     let items = Items::new(&mut arena, width, DRAWN)?;
+    let candidates = Candidates::new(&mut arena, KEPT)?;
     let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
     let mut painter = Painter {
         solved,
@@ -208,6 +213,7 @@ pub fn rows(
     if solved.bvh.is_own() {
         painter.outlook = Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
     }
+    painter.outlook = painter.outlook.with_candidates(candidates);
     if camera.is_parallel() {
         painter.look_beside();
     }

@@ -7,6 +7,7 @@ use crate::base::error::Error;
 use crate::base::index::Index;
 use crate::base::math::Vec3;
 use crate::base::simd::Isa;
+use crate::rays::outline::Outlines;
 use crate::scene::Scene;
 
 plain_struct! {
@@ -27,7 +28,8 @@ impl<'m> Bvh<'m> {
         writer.put(self.packets)?;
         writer.put(self.slacks)?;
         writer.put(self.facets)?;
-        writer.put(self.solids)
+        writer.put(self.solids)?;
+        self.outlines.put(writer)
     }
 
     pub(crate) fn get(view: &mut View<'m>, scene: &Scene<'_>, isa: Isa) -> Result<Bvh<'m>, Error> {
@@ -50,6 +52,7 @@ impl<'m> Bvh<'m> {
             scale: low.abs().max(high.abs()).max_element(),
             isa,
             external: None,
+            outlines: Outlines::get(view, scene.facets())?,
         };
         bvh.levels = bvh.sound_levels().ok_or(Error::Block)?;
         if bvh.packets_sound(scene) { Ok(bvh) } else { Err(Error::Block) }

@@ -9,7 +9,7 @@
 //! Where a ray is short beside the element that it meets, the element's linear function says nothing of light there: beside
 //! contact lines, where a body is pierced by another. The ray goes on diffusely from there, as paths do, until it is not.
 
-use super::{How, Leg, Path, Sample, Solved, Surroundings, Terms, linear};
+use super::{How, Leg, OpenAt, Path, Sample, Solved, Surroundings, Terms, held};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{PI, Vec3, clamp, frame, pow, sqrt};
@@ -23,7 +23,7 @@ use crate::scene::MAX_BANDS;
 pub(crate) const GATHERS: bool = cfg!(feature = "std");
 
 /// Bands for which there is room.
-const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
+pub(super) const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
 
 /// Fewest and most rays from a point.
 const FEWEST: f64 = 128.0;
@@ -81,6 +81,8 @@ plain_table! {
         pub unknowns: [u64; KEPT],
         /// Sum of the expected errors of what the rays met.
         pub carried: f64,
+        /// Rays that met something.
+        pub hits: u64,
         /// How many there are.
         pub count: u64,
         /// What stands about the latest element; none at first.
@@ -101,6 +103,7 @@ impl Gathered {
         errors: [0.0; KEPT],
         unknowns: [0; KEPT],
         carried: 0.0,
+        hits: 0,
         count: 0,
         surroundings: Surroundings::ZERO,
     };
@@ -189,6 +192,8 @@ pub(super) struct Spot<'a> {
     pub weight: f64,
     /// Reflections between it and the eye.
     pub bounces: u32,
+    /// The straight sky, where it is known: then rays find the rest alone.
+    pub open: Option<&'a OpenAt<'a>>,
 }
 
 impl Solved<'_> {
@@ -273,6 +278,7 @@ impl Solved<'_> {
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
         gathered.sky.fill(0.0);
         gathered.carried = 0.0;
+        gathered.hits = 0;
         // fewer may all miss what little is bright, and agree
         let (mut done, mut rays) = (0, (least as u32).next_power_of_two());
         loop {
@@ -308,16 +314,17 @@ impl Solved<'_> {
         let ray = spot.surface.leave(direction);
         let mut hit = self.bvh.closest(&ray);
         path.rays += 1;
-        let Gathered { terms, through, onward, sky, beyond, open, carried, .. } = gathered;
+        let Gathered { terms, through, onward, sky, beyond, open, carried, hits, .. } = gathered;
         let (terms, through, throughput) = (terms.first_mut()?, through.first_mut()?, onward.first_mut()?);
         let (beyond, open) = (beyond.get_mut(part)?, open.get_mut(part)?);
-        if let Some(light) = &self.light.sky {
+        if let (None, Some(light)) = (spot.open, &self.light.sky) {
             light.radiance(direction, sky.head_mut(bands));
             open.iter_mut().zip(&*sky).take(bands).for_each(|(sum, l)| *sum += l);
         }
         if hit.is_none() {
             return Some(());
         }
+        *hits += 1;
         terms.clear(bands);
         through.head_mut(bands).fill(1.0);
         let mut leg = Leg {
@@ -388,14 +395,19 @@ impl Solved<'_> {
     fn note(&self, spot: &Spot<'_>, gathered: &mut Gathered, place: usize, exact: bool, rays: u32) -> f64 {
         let bands = self.shape.bands.min(BANDS);
         gathered.sky.fill(0.0);
-        if let (true, Some(sky)) = (exact, &self.light.sky) {
+        if let (true, None, Some(sky)) = (exact, spot.open, &self.light.sky) {
             sky.irradiance(spot.surface.normal, self.settings.sky_error, gathered.sky.head_mut(bands));
         }
+        // what is met is known to fill what is not open
+        let scale = match spot.open {
+            Some(open) if gathered.hits > 0 => (1.0 - open.share) * f64::from(rays) / gathered.hits as f64,
+            _ => 1.0,
+        };
         for band in 0..bands {
             let (mean, _) = gathered.mean(band, rays, exact);
-            let irradiance = PI * mean + gathered.sky.at(band);
+            let irradiance = PI * scale * mean + gathered.sky.at(band);
             if let Some(corrections) = gathered.corrections.get_mut(place) {
-                corrections.set(band, irradiance - linear(spot.values, bands, spot.local, band));
+                corrections.set(band, irradiance - held(spot.values, bands, spot.local, spot.open, band));
             }
         }
         let carried = gathered.carried / f64::from(rays);

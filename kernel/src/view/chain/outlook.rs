@@ -6,6 +6,7 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
 use crate::radiosity::sun_image::SAME;
 use crate::rays::bvh::HalfSpace;
+use crate::rays::outline::Candidates;
 use crate::rays::surface::{OFFSET, Surface};
 use crate::scene::NO_MIRROR;
 
@@ -57,6 +58,8 @@ plain_struct! {
 /// Ways asked for lately; the same answers whether they are remembered or not.
 pub struct Outlook<'m> {
     ways: &'m mut [Way],
+    /// What may be outlines from points of facets.
+    pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
     parallel: bool,
     /// Facets seen smaller than this are not worth a look along the mirror direction, and toward the sun: their few rays
@@ -75,12 +78,17 @@ impl<'m> Outlook<'m> {
     /// rays have this area each, and so many follow them toward the sun.
     pub fn new(ways: &'m mut [Way], parallel: bool, area: f64, sun: f64) -> Outlook<'m> {
         let least = if parallel { WORTH * area } else { 0.0 };
-        Outlook { ways, parallel, least: (least, least / sun) }
+        Outlook { ways, candidates: Candidates::none(), parallel, least: (least, least / sun) }
     }
 
     /// No outlook: every ray is traced.
     pub fn none() -> Outlook<'m> {
-        Outlook { ways: &mut [], parallel: false, least: (0.0, 0.0) }
+        Outlook { ways: &mut [], candidates: Candidates::none(), parallel: false, least: (0.0, 0.0) }
+    }
+
+    /// The same with room for outlines.
+    pub fn with_candidates(self, candidates: Candidates<'m>) -> Outlook<'m> {
+        Outlook { candidates, ..self }
     }
 
     /// Whether first rays are parallel and ways are known.

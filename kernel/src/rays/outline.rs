@@ -1,0 +1,236 @@
+//! What is open above a point, by the outlines of what stands there: no rays.
+//!
+//! The number of facets in a direction changes only at *outline edges*: edges whose two facets turn different sides to the
+//! point, or that have one facet. Lambert's contour sum over them, each times its jump of counted facets, is the exact sum
+//! of the form factors of all counted facets, hidden or not (`contour.rs`). Where counted facets cover one another, or
+//! others cover the sky, great circles through the pole tell by how much the sum differs from what is blocked
+//! (`circles.rs`); where no circle finds any, the sum is the answer.
+//!
+//! A facet is counted where its front shows; where the back carries a material and its body has a rim, on both sides. All
+//! decisions are signs of the same few products, so that the count of facets along any circle is right whatever is rounded.
+//!
+//! The edges are found once for a mesh (`edges.rs`), those that matter to the points of one facet once for that facet
+//! (`candidates.rs`).
+
+mod candidates;
+mod circles;
+mod contour;
+mod edges;
+
+pub use candidates::Candidates;
+
+use crate::base::arena::{Arena, Need, View, Writer, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::IndexMut;
+use crate::base::math::{Vec3, unit};
+use crate::base::simd::WIDTH;
+
+/// Rows of a [`Block`]: the lower end (lexicographically) and the upper one, both planes (normal and distance), the sense
+/// in which each facet runs through the edge (1: from the lower end; -1; 0 where there is none), by what each facet counts
+/// where its back shows, and the body's number.
+const ROWS: usize = 19;
+
+/// Edges, lane by lane.
+type Block = [[f64; WIDTH]; ROWS];
+
+/// Centre and radius of a ball about each of some facets, lane by lane.
+type Balls = [[f32; WIDTH]; 4];
+
+/// Set in a facet's group where its body has a rim: both of its sides count, where both carry a material.
+const BOTH: u32 = 1 << 31;
+
+/// Where there are more edges, finding those that matter to a facet costs as much as some hundreds of rays.
+const MOST_EDGES: usize = 1 << 16;
+
+/// The most facets of which edges are looked for: flat parts have fewer edges than facets.
+const MOST_FACETS: usize = 1 << 18;
+
+/// Edges of small meshes beyond two a facet.
+const FEW_EDGES: usize = 64;
+
+/// Where memory is small there are none, and rays find what is open.
+const KEEPS: bool = cfg!(feature = "std");
+
+/// Facets that rise less above a point's plane (scene coordinates) lie in it: some thousand roundings of a height.
+const SLACK: f64 = 1e-12;
+
+plain_struct! {
+    /// Outlines without their arrays.
+    pub struct Head {
+        /// Edges.
+        pub edges: u64,
+        /// Facets; 0 where there are no outlines.
+        pub facets: u64,
+    }
+}
+
+/// The edges of a mesh that may be outlines.
+#[derive(Clone, Copy, Debug)]
+pub struct Outlines<'m> {
+    blocks: &'m [Block],
+    balls: &'m [Balls],
+    /// The facet whose plane each facet has, and [`BOTH`].
+    groups: &'m [u32],
+    edges: usize,
+}
+
+impl<'m> Outlines<'m> {
+    /// Without edges: nothing is known.
+    pub const NONE: Outlines<'static> = Outlines { blocks: &[], balls: &[], groups: &[], edges: 0 };
+
+    /// Most edges of a mesh of so many facets: a closed one has one and a half a facet.
+    fn most(facets: usize) -> usize {
+        if !KEEPS || facets > MOST_FACETS { 0 } else { (2 * facets + FEW_EDGES).min(MOST_EDGES) }
+    }
+
+    /// Adds the memory of a mesh of so many facets, at most some 370 bytes each.
+    pub fn need(need: Need, facets: usize) -> Need {
+        let most = Outlines::most(facets);
+        if most == 0 {
+            return need;
+        }
+        let need = need.and::<u32>(facets).and::<Balls>(facets.div_ceil(WIDTH));
+        edges::Build::need(need, facets, most).and::<Block>(most.div_ceil(WIDTH))
+    }
+
+    /// Finds the edges of facets of these corners and areas, 0 where they are degenerate; none where there are so many that
+    /// rays cost less.
+    ///
+    /// # Errors
+    /// [`Error::BufferTooSmall`] below [`Outlines::need`].
+    pub fn new(corners: &[[Vec3; 3]], areas: &[f64], arena: &mut Arena<'m>) -> Result<Outlines<'m>, Error> {
+        let facets = corners.len();
+        let most = Outlines::most(facets);
+        if most == 0 {
+            return Ok(Outlines::NONE);
+        }
+        let groups = arena.take::<u32>(facets)?;
+        let balls = arena.take::<Balls>(facets.div_ceil(WIDTH))?;
+        let found = edges::Build::new(corners, areas, most, arena)?.run(groups);
+        let Some(found) = found else { return Ok(Outlines::NONE) };
+        let edges = found.count();
+        let blocks = arena.take::<Block>(edges.div_ceil(WIDTH))?;
+        found.lay(groups, blocks);
+        enclose(corners, areas, balls);
+        Ok(Outlines { blocks, balls, groups, edges })
+    }
+
+    /// Edges that may be outlines.
+    pub fn edges(&self) -> usize {
+        self.edges
+    }
+
+    /// True for [`Outlines::NONE`].
+    pub fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    pub(crate) fn put(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
+        writer.put(&[Head { edges: self.edges as u64, facets: self.groups.len() as u64 }])?;
+        writer.put(self.groups)?;
+        writer.put(self.balls)?;
+        writer.put(self.blocks)
+    }
+
+    pub(crate) fn get(view: &mut View<'m>, facets: usize) -> Result<Outlines<'m>, Error> {
+        let head = view.take::<Head>(1)?.first().copied().ok_or(Error::Block)?;
+        let all = head.facets == facets as u64 && head.edges <= MOST_EDGES as u64;
+        if !all && (head.facets, head.edges) != (0, 0) {
+            return Err(Error::Block);
+        }
+        let (edges, facets) = (head.edges as usize, head.facets as usize);
+        let groups = view.take::<u32>(facets)?;
+        let balls = view.take::<Balls>(facets.div_ceil(WIDTH))?;
+        let blocks = view.take::<Block>(edges.div_ceil(WIDTH))?;
+        let known = |group: &u32| ((group & !BOTH) as usize) < facets;
+        // coordinates of the scene, senses of facets and numbers of bodies
+        let right = |(row, x): (usize, &f64)| x.abs() <= if row == ROWS - 1 { 4e9 } else { 4.0 };
+        let rows = blocks.iter().flat_map(|block| block.iter().enumerate());
+        let mut values = rows.flat_map(|(row, lanes)| lanes.iter().map(move |x| (row, x)));
+        if groups.iter().all(known) && values.all(right) {
+            Ok(Outlines { blocks, balls, groups, edges })
+        } else {
+            Err(Error::Block)
+        }
+    }
+
+    /// Bytes in use.
+    pub fn memory(&self) -> usize {
+        size_of_val(self.blocks) + size_of_val(self.balls) + size_of_val(self.groups)
+    }
+}
+
+/// Normal and distance of a facet's own plane.
+fn plane(corners: &[Vec3; 3]) -> (Vec3, f64) {
+    let [a, b, c] = *corners;
+    let normal = unit((b - a).cross(c - a)).unwrap_or(Vec3::ZERO);
+    (normal, product(normal, a))
+}
+
+/// a.b, always in the same order, so that equal corners have equal coordinates wherever they are computed.
+#[inline(always)]
+fn product(a: Vec3, b: Vec3) -> f64 {
+    (a.x * b.x + a.y * b.y) + a.z * b.z
+}
+
+/// Whether a corner comes before another, by place.
+fn precedes(a: Vec3, b: Vec3) -> bool {
+    edges::order(a, b) == core::cmp::Ordering::Less
+}
+
+/// The ball about the middle of each facet.
+fn enclose(corners: &[[Vec3; 3]], areas: &[f64], balls: &mut [Balls]) {
+    for (facet, (corners, area)) in corners.iter().zip(areas).enumerate() {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let far = corners.iter().map(|c| (*c - middle).length_squared()).fold(0.0, f64::max);
+        // a negative radius meets nothing
+        let radius = if *area > 0.0 { crate::base::math::sqrt(far) } else { f64::NEG_INFINITY };
+        let values = [middle.x, middle.y, middle.z, radius];
+        if let Some(ball) = balls.get_mut(facet / WIDTH) {
+            ball.iter_mut().zip(values).for_each(|(lanes, x)| lanes.set(facet % WIDTH, x as f32));
+        }
+    }
+    let rest = corners.len() % WIDTH;
+    if let (true, Some([.., radii])) = (rest > 0, balls.last_mut()) {
+        radii.iter_mut().skip(rest).for_each(|r| *r = f32::NEG_INFINITY);
+    }
+}
+
+/// How the sky depends on direction, as far as outlines tell: what is open of it is a sum of these.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Basis {
+    /// The same everywhere.
+    Whole,
+    /// Apart above and below the horizon of this unit vector, on each side as a linear function of the direction's height.
+    Horizon(Vec3),
+}
+
+/// Irradiance over pi by what is open of skies over a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenSky {
+    /// Of the radiance 1, and of the height above the horizon, over the whole sphere; the same on the side of the horizon
+    /// where [`OpenSky::above`] tells. But for the first 0 where the basis is [`Basis::Whole`].
+    pub values: [f64; 4],
+    /// Whether the last two are for the side above the horizon, or for that below.
+    pub above: bool,
+    /// Expected error of the first.
+    pub error: f64,
+    /// Whether the point is inside a closed body.
+    pub inside: bool,
+}
+
+impl OpenSky {
+    /// Of the radiances 1 above and below the horizon.
+    pub fn halves(&self) -> (f64, f64) {
+        self.sides(self.values[0], self.values[2])
+    }
+
+    /// Of the heights above the horizon as radiances, above and below it.
+    pub fn heights(&self) -> (f64, f64) {
+        self.sides(self.values[1], self.values[3])
+    }
+
+    fn sides(&self, whole: f64, one: f64) -> (f64, f64) {
+        if self.above { (one, whole - one) } else { (whole - one, one) }
+    }
+}

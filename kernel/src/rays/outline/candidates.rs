@@ -1,0 +1,416 @@
+//! What matters to the points of one facet: the edges that are outlines from some of them, and the facets over their pole.
+
+use super::contour::{self, Contour, spread, sweep};
+use super::{BOTH, Balls, Basis, Block, OpenSky, Outlines, SLACK, circles, plane, precedes, product};
+use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::error::Error;
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::{Vec3, frame, sqrt, unit};
+use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
+use crate::rays::bvh::Bvh;
+use crate::scene::Scene;
+
+/// The most edges that are looked at for one facet: where more may be outlines, rays cost less.
+const MOST_EDGES: usize = 1024;
+
+/// Blocks of one facet at most, and facets over its pole.
+const BLOCKS: usize = if KEEPS { MOST_EDGES / WIDTH } else { 0 };
+const POLES: usize = if KEEPS { 512 } else { 0 };
+
+/// Lists that are kept for each facet that would need all of that.
+const LISTS: usize = if KEEPS { 32 } else { 0 };
+
+/// Room for crossings.
+const CROSSINGS: usize = if KEEPS { 2 * MOST_EDGES + 16 * WIDTH } else { 0 };
+
+/// Where memory is small nothing is kept, and rays find what is open.
+const KEEPS: bool = cfg!(feature = "std");
+
+/// In place of a count: too many.
+const CROWDED: u32 = u32::MAX;
+
+/// Heights of planes above a corner (scene coordinates) whose sign is in doubt.
+const DOUBT: f64 = 1e-13;
+
+/// Rows of an active edge: both ends in the frame of the point, and its jumps of all and of counted facets.
+pub(super) const ACTIVE: usize = 8;
+
+/// Edges that are outlines from a point, lane by lane.
+pub(super) type Active = [[f64; WIDTH]; ACTIVE];
+
+/// Where a half circle crosses an outline: the square of the sine of the angle from the pole, both jumps, and the half
+/// circle's number.
+pub(super) type Crossing = [f64; 4];
+
+/// Frame of a point: the pole is its normal, the first axis points toward the horizon's zenith as far as may be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub point: Vec3,
+    pub axes: [Vec3; 3],
+    /// Zenith of the near side of the horizon, on which the pole is: along the first axis and the pole.
+    pub zenith: (f64, f64),
+    /// Whether that is the side above the horizon.
+    pub above: bool,
+}
+
+impl Frame {
+    fn new(point: Vec3, normal: Vec3, basis: Basis) -> Frame {
+        let (x, y) = frame(normal);
+        let mut own = Frame { point, axes: [x, y, normal], zenith: (0.0, 1.0), above: true };
+        if let Basis::Horizon(up) = basis {
+            own.above = normal.dot(up) >= 0.0;
+            let up = if own.above { up } else { -up };
+            let height = normal.dot(up).min(1.0);
+            let across = up - normal * height;
+            if let (true, Some(x)) = (across.length_squared() > 1e-24, unit(across)) {
+                own.axes = [x, normal.cross(x), normal];
+                own.zenith = (sqrt(across.length_squared()), height);
+            }
+        }
+        own
+    }
+
+    /// A place in this frame, in the arithmetic of the outlines' ends.
+    fn place(&self, corner: Vec3) -> Vec3 {
+        let from = corner - self.point;
+        let [x, y, z] = self.axes.map(|axis| product(axis, from));
+        Vec3::new(x, y, z)
+    }
+}
+
+plain_struct! {
+    /// What was found for a side of a facet.
+    pub struct List {
+        /// Twice the facet and the side, and one; 0: nothing.
+        pub side: u32,
+        /// Where its edges start, in blocks, and how many there are; or [`CROWDED`].
+        pub blocks: u32,
+        /// See there.
+        pub edges: u32,
+        /// The same of facets over the pole.
+        pub poles: u32,
+        /// See there.
+        pub over: u32,
+    }
+}
+
+/// Edges and facets that matter to facets asked for lately; the same answers whether they are remembered or not.
+#[derive(Debug)]
+pub struct Candidates<'m> {
+    pool: &'m mut [Block],
+    poles: &'m mut [u32],
+    lists: &'m mut [List],
+    /// Blocks and poles in use.
+    used: (usize, usize),
+    active: &'m mut [Active],
+    crossings: &'m mut [Crossing],
+    sorted: &'m mut [Crossing],
+    list: List,
+    normal: Vec3,
+}
+
+impl<'m> Candidates<'m> {
+    /// Adds the memory that it works in, with room for `kept` facets about which much stands, or some dozen times as many
+    /// about which little does.
+    pub fn need(need: Need, kept: usize) -> Need {
+        let need = need.and::<Block>(kept * BLOCKS).and::<u32>(kept * POLES).and::<List>(kept * LISTS);
+        need.and::<Active>(BLOCKS).and::<Crossing>(CROSSINGS).and::<Crossing>(CROSSINGS)
+    }
+
+    /// Takes that memory.
+    pub fn new(arena: &mut Arena<'m>, kept: usize) -> Result<Candidates<'m>, Error> {
+        Ok(Candidates {
+            pool: arena.take(kept * BLOCKS)?,
+            poles: arena.take(kept * POLES)?,
+            lists: arena.take(kept * LISTS)?,
+            used: (0, 0),
+            active: arena.take(BLOCKS)?,
+            crossings: arena.take(CROSSINGS)?,
+            sorted: arena.take(CROSSINGS)?,
+            list: List::default(),
+            normal: Vec3::Z,
+        })
+    }
+
+    /// None.
+    pub fn none() -> Candidates<'m> {
+        Candidates {
+            pool: &mut [],
+            poles: &mut [],
+            lists: &mut [],
+            used: (0, 0),
+            active: &mut [],
+            crossings: &mut [],
+            sorted: &mut [],
+            list: List::default(),
+            normal: Vec3::Z,
+        }
+    }
+
+    /// Finds what matters to the points of a facet's side. False where that is too much: rays cost less there.
+    pub fn prepare(&mut self, scene: &Scene<'_>, bvh: &Bvh<'_>, (facet, side): (usize, usize)) -> bool {
+        let (outlines, isa) = (bvh.outlines(), bvh.isa());
+        if self.lists.is_empty() || outlines.is_empty() {
+            return false;
+        }
+        let name = (2 * facet + side + 1) as u32;
+        self.normal = scene.side_normal(facet, side);
+        let place = name as usize % self.lists.len().max(1);
+        self.list = self.lists.at(place);
+        if self.list.side != name {
+            let full = self.used.0 + BLOCKS > self.pool.len() || self.used.1 + POLES > self.poles.len();
+            self.list = self.find(scene, outlines, isa, facet, name);
+            if self.list.edges == CROWDED && full {
+                // make room, and once more
+                self.lists.fill(List::default());
+                self.used = (0, 0);
+                self.list = self.find(scene, outlines, isa, facet, name);
+            }
+            self.lists.set(place, self.list);
+        }
+        self.list.edges != CROWDED
+    }
+
+    /// Finds them behind what is in use.
+    #[inline(never)]
+    fn find(
+        &mut self,
+        scene: &Scene<'_>,
+        outlines: &Outlines<'_>,
+        isa: Isa,
+        facet: usize,
+        name: u32,
+    ) -> List {
+        let corners = &scene.corners().at(facet);
+        let normal = self.normal;
+        let height = corners.iter().map(|c| product(normal, *c)).fold(f64::INFINITY, f64::min);
+        let (blocks, poles) = self.used;
+        let end = (blocks + BLOCKS).min(self.pool.len());
+        let free = self.pool.part_mut(blocks..end);
+        let (edges, fits) = run_wide(isa, Sort { outlines, corners, normal, height, out: free });
+        let over = if fits { self.over_pole(scene, outlines, facet, corners, height) } else { None };
+        let Some(over) = over else { return List { side: name, edges: CROWDED, ..List::default() } };
+        self.used = (blocks + edges.div_ceil(WIDTH), poles + over);
+        List {
+            side: name,
+            blocks: blocks as u32,
+            edges: edges as u32,
+            poles: poles as u32,
+            over: over as u32,
+        }
+    }
+
+    /// Whether nothing rises above the facet that was prepared.
+    pub fn is_clear(&self) -> bool {
+        self.list.edges == 0 && self.list.over == 0
+    }
+
+    /// Finds the facets that the normal of some point of a facet may meet; how many.
+    fn over_pole(
+        &mut self,
+        scene: &Scene<'_>,
+        outlines: &Outlines<'_>,
+        own: usize,
+        corners: &[Vec3; 3],
+        height: f64,
+    ) -> Option<usize> {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let far = corners.iter().map(|c| (*c - middle).length_squared()).fold(0.0, f64::max);
+        let about = [middle.x, middle.y, middle.z, sqrt(far)].map(|x| x as f32);
+        let axis = self.normal.to_array().map(|x| x as f32);
+        let group = outlines.groups.at(own) & !BOTH;
+        let end = (self.used.1 + POLES).min(self.poles.len());
+        let places = self.poles.part_mut(self.used.1..end);
+        let mut count = 0;
+        for (block, balls) in outlines.balls.iter().enumerate() {
+            let mut near = meets(balls, about, axis);
+            while near != 0 {
+                let facet = block * WIDTH + near.trailing_zeros() as usize;
+                near &= near - 1;
+                let of = outlines.groups.at(facet) & !BOTH;
+                let heights = scene.corners().at(facet).map(|c| product(self.normal, c) - height);
+                if of != group && heights.iter().any(|h| *h > SLACK) {
+                    *places.get_mut(count)? = facet as u32;
+                    count += 1;
+                }
+            }
+        }
+        Some(count)
+    }
+
+    /// What is open over a point of the facet that was prepared; circles are added until the expected error is at most
+    /// `goal`, as far as that goes. `None` where there is too much.
+    pub fn open(
+        &mut self,
+        scene: &Scene<'_>,
+        bvh: &Bvh<'_>,
+        point: Vec3,
+        basis: Basis,
+        goal: f64,
+    ) -> Option<OpenSky> {
+        let (known, isa) = (bvh.outlines(), bvh.isa());
+        if self.list.side == 0 || self.list.edges == CROWDED {
+            return None;
+        }
+        let frame = Frame::new(point, self.normal, basis);
+        let over = self.pole(scene, known, &frame);
+        let whole = contour::whole(&frame, basis);
+        let first = self.list.blocks as usize;
+        let blocks = self.pool.part(first..first + (self.list.edges as usize).div_ceil(WIDTH));
+        let (active, one) = sweep(isa, &frame, blocks, scene.sides() == 2, self.active);
+        let lit = |values| OpenSky { values, above: frame.above, error: 0.0, inside: over.inside > 0 };
+        if active == 0 {
+            return Some(lit(if over.all == 0 { whole } else { [0.0; 4] }));
+        }
+        let outlines = self.active.head(active.div_ceil(WIDTH));
+        let counted = run_wide(isa, Contour { frame: &frame, basis, active: outlines });
+        let crossings = (&mut *self.crossings, &mut *self.sorted);
+        let found = circles::look(isa, (&frame, basis), (outlines, one), &over, goal, crossings)?;
+        let mut values = found.values;
+        if !found.is_open {
+            for (k, value) in values.iter_mut().enumerate() {
+                *value += whole[k] - (f64::from(over.counted) * whole[k] + counted[k]);
+            }
+        }
+        for k in [0, 2] {
+            values[k] = values[k].min(whole[k]).max(0.0);
+        }
+        Some(OpenSky { error: found.error, ..lit(values) })
+    }
+
+    /// The facets straight over a point.
+    fn pole(&self, scene: &Scene<'_>, outlines: &Outlines<'_>, frame: &Frame) -> Over {
+        let mut over = Over::default();
+        let first = self.list.poles as usize;
+        for &facet in self.poles.part(first..first + self.list.over as usize) {
+            let facet = facet as usize;
+            let corners = scene.corners().at(facet);
+            let Some(turn) = winding(frame, &corners) else { continue };
+            let of = outlines.groups.at(facet);
+            let both = scene.sides() == 2 && of & BOTH != 0;
+            let (normal, distance) = plane(&scene.corners().at((of & !BOTH) as usize));
+            let front = product(normal, frame.point) - distance > 0.0;
+            // a front that is run through clockwise, or a back the other way, is above; else it is below
+            if front == turn {
+                continue;
+            }
+            over.all += 1;
+            over.counted += i32::from(front || both);
+            over.inside += if of & BOTH != 0 {
+                0
+            } else if front {
+                -1
+            } else {
+                1
+            };
+        }
+        over
+    }
+}
+
+/// What is straight over a point: all facets, those that count, and the backs less the fronts of closed bodies.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Over {
+    pub all: i32,
+    pub counted: i32,
+    pub inside: i32,
+}
+
+/// Whether a triangle runs about the pole counter-clockwise; `None` where it does not run about it. By the signs that tell
+/// on which side of the pole outlines pass.
+fn winding(frame: &Frame, corners: &[Vec3; 3]) -> Option<bool> {
+    let places = corners.map(|c| frame.place(c));
+    let side = |i: usize, j: usize| {
+        let (a, b) = (places[i], places[j]);
+        // from the lower end to the upper, as in outlines
+        if precedes(corners[i], corners[j]) {
+            a.x * b.y - a.y * b.x > 0.0
+        } else {
+            b.x * a.y - b.y * a.x <= 0.0
+        }
+    };
+    let turn = side(0, 1);
+    (turn == side(1, 2) && turn == side(2, 0)).then_some(turn)
+}
+
+/// Which balls a cylinder about an axis meets that goes up from a ball.
+#[inline(always)]
+fn meets(balls: &Balls, [x, y, z, r]: [f32; 4], axis: [f32; 3]) -> u32 {
+    let [xs, ys, zs, rs] = balls;
+    let mut near = 0;
+    for lane in 0..WIDTH {
+        let (a, b, c) = (xs[lane] - x, ys[lane] - y, zs[lane] - z);
+        let up = a * axis[0] + b * axis[1] + c * axis[2];
+        let across = a * a + b * b + c * c - up * up;
+        // some roundings of numbers of size 4
+        let reach = (rs[lane] + r) * 1.000_01 + 4e-6;
+        near |= u32::from(rs[lane] >= 0.0 && up >= -reach && across <= reach * reach + 4e-6) << lane;
+    }
+    near
+}
+
+/// Finds the edges that rise above the facet's plane and are outlines from some point of it.
+struct Sort<'a> {
+    outlines: &'a Outlines<'a>,
+    corners: &'a [Vec3; 3],
+    normal: Vec3,
+    height: f64,
+    out: &'a mut [Block],
+}
+
+impl WideTask for Sort<'_> {
+    type Out = (usize, bool);
+
+    #[inline(always)]
+    fn run<L: Lanes64>(self, lanes: L) -> (usize, bool) {
+        let Sort { outlines, corners, normal, height, out } = self;
+        let n = spread(lanes, normal);
+        let corners = [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])];
+        let (least, doubt, zero) = (lanes.all(height + SLACK), lanes.all(DOUBT), lanes.all(0.0));
+        let mut count = 0;
+        for (number, block) in outlines.blocks.iter().enumerate() {
+            let row = |k: usize| lanes.of(&block[k]);
+            let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
+            let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
+            let mut kept = L::F::bits(low.max(other).gt(least));
+            if kept == 0 {
+                continue;
+            }
+            let first = heights(zero, &corners, [row(6), row(7), row(8), row(9)]);
+            let other = heights(zero, &corners, [row(10), row(11), row(12), row(13)]);
+            let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
+            let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
+            let rim = !L::F::bits(row(15).abs().gt(zero));
+            kept &= !same | rim;
+            let last = outlines.edges - number * WIDTH;
+            if last < WIDTH {
+                kept &= (1 << last) - 1;
+            }
+            while kept != 0 {
+                let lane = kept.trailing_zeros() as usize % WIDTH;
+                kept &= kept - 1;
+                let Some(to) = out.get_mut(count / WIDTH) else { return (count, false) };
+                for (to, from) in to.iter_mut().zip(block) {
+                    to[count % WIDTH] = from[lane];
+                }
+                count += 1;
+            }
+        }
+        if let Some(rest) = out.get_mut(count / WIDTH) {
+            for lane in count % WIDTH..WIDTH {
+                rest.iter_mut().for_each(|row| row[lane] = 0.0);
+            }
+        }
+        (count, true)
+    }
+}
+
+/// The least and the greatest height of three corners above planes; `none` is 0.
+#[inline(always)]
+fn heights<F: Wide>(none: F, corners: &[[F; 3]; 3], [x, y, z, d]: [F; 4]) -> (F, F) {
+    let [a, b, c] = corners;
+    let a = a[0] * x + a[1] * y + a[2] * z - d;
+    let b = b[0] * x + b[1] * y + b[2] * z - d;
+    let c = c[0] * x + c[1] * y + c[2] * z - d;
+    (none - (none - a).max(none - b).max(none - c), a.max(b).max(c))
+}

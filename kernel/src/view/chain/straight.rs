@@ -1,0 +1,68 @@
+//! The sky that a point sees straight, by outlines, in place of what its element holds of it.
+
+use super::gather::BANDS;
+use super::{Outlook, Solved, linear};
+use crate::base::index::{Index, IndexMut};
+use crate::base::math::clamp;
+use crate::coupling::element::Local;
+use crate::radiosity::straight;
+use crate::rays::surface::Surface;
+
+/// Part of the tolerance that circles may leave at a point.
+const PART: f64 = 0.25;
+
+/// Points that count less than this many tolerances take what their elements hold: that is seldom wrong by more than a part
+/// of the sky.
+const LEAST: f64 = 4.0;
+
+/// The most by which what is blocked at a point may differ from the element's linear function.
+const MOST: f64 = 2.0;
+
+/// The straight sky at a point.
+pub(super) struct OpenAt<'a> {
+    /// Its irradiance, one value per band.
+    pub irradiance: [f64; BANDS],
+    /// What the element's irradiance holds of it, mean and gradients.
+    pub held: &'a [f64],
+    /// Share of the hemisphere that is open, weighed by the cosine.
+    pub share: f64,
+    /// By what all else that arrives counts at the point: as what is blocked there to what is by the element's linear
+    /// function.
+    pub ratio: f64,
+    /// Expected squared error of the irradiance over pi, relative to the reference radiance.
+    pub variance: f64,
+}
+
+impl<'a> Solved<'a> {
+    /// The straight sky at a point whose light counts `weight`. `None` where outlines do not tell it, or it counts too
+    /// little.
+    #[inline(never)]
+    pub(super) fn open_at(
+        &self,
+        surface: &Surface,
+        unknown: usize,
+        weight: f64,
+        local: Local,
+        outlook: &mut Outlook<'_>,
+    ) -> Option<OpenAt<'a>> {
+        let sky = self.light.sky.as_ref()?;
+        let bands = self.shape.bands;
+        let (held, _) = self.straight.of(unknown, bands)?;
+        if bands > BANDS || weight < LEAST * self.settings.tolerance {
+            return None;
+        }
+        let basis = straight::basis(self.bvh, sky)?;
+        let candidates = &mut outlook.candidates;
+        if !candidates.prepare(self.scene, self.bvh, (surface.facet, surface.side)) {
+            return None;
+        }
+        let goal = PART * self.settings.tolerance / weight;
+        let open = candidates.open(self.scene, self.bvh, surface.point, basis, goal)?;
+        let mut irradiance = [0.0; BANDS];
+        straight::irradiance(&open, sky, irradiance.head_mut(bands));
+        let share = open.values[0];
+        let blocked = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
+        let ratio = if blocked > 0.0 { clamp((1.0 - share) / blocked, 1.0 / MOST, MOST) } else { 1.0 };
+        Some(OpenAt { irradiance, held, share, ratio, variance: open.error * open.error })
+    }
+}
