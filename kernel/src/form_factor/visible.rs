@@ -19,6 +19,10 @@ const STORED: usize = 6;
 /// Times that a patch of the receiver is halved, at least: to meet a small shadow at all.
 const SHALLOWEST: u32 = 6;
 
+/// So many times more where patches are larger than the target is high above them: two resolutions of a narrow gap agree
+/// by chance.
+const NEAR: u32 = 4;
+
 /// Times that a patch of the receiver is halved, at most.
 const DEEPEST: u32 = 26;
 
@@ -112,7 +116,11 @@ fn visible(
             let Some((receiver, target)) = fronts(&piece, &target) else {
                 continue;
             };
-            let mut mean = Mean { normal, size, target, occluders, tolerance: 0.25 * tolerance, scratch };
+            let base = receiver.corners().first().copied().unwrap_or(Vec3::ZERO);
+            let heights = target.corners().iter().map(|c| (*c - base).dot(normal));
+            let height = heights.fold(0.0, f64::max);
+            let tolerance = 0.25 * tolerance;
+            let mut mean = Mean { normal, size, height, target, occluders, tolerance, scratch };
             let (parts, count) = cut_along_traces(&receiver, normal, occluders);
             for patch in parts.iter().take(count).flat_map(|part| patches(part.corners())) {
                 let coarse = mean.over(&patch)?;
@@ -268,6 +276,8 @@ struct Mean<'m> {
     normal: Vec3,
     /// Area of the receiver, over which the mean is taken.
     size: f64,
+    /// How far above its plane the target rises.
+    height: f64,
     target: Convex,
     occluders: &'m [[Vec3; 3]],
     tolerance: f64,
@@ -294,13 +304,19 @@ impl Mean<'_> {
         let mut halvings = [Halving::default(); DEEPEST as usize];
         let (mut path, mut patch, mut coarse, mut parent) =
             (HalvingPath::default(), *whole, coarse, f64::INFINITY);
+        // two halvings halve the size
+        let (mut shallowest, mut square) = (SHALLOWEST, whole.size() * whole.size());
+        square /= f64::from(1u32 << SHALLOWEST);
+        while 4.0 * square > self.height * self.height && shallowest < SHALLOWEST + NEAR {
+            (shallowest, square) = (shallowest + 1, 0.5 * square);
+        }
         loop {
             let (low, high) = (self.over(&patch.half(false))?, self.over(&patch.half(true))?);
             let difference = (low + high - coarse).abs();
             let error = difference.max(0.25 * parent);
             let within = error <= self.tolerance * patch.size() / sqrt(self.size);
             let depth = path.depth();
-            if !(within && depth >= SHALLOWEST) && path.down(DEEPEST) {
+            if !(within && depth >= shallowest) && path.down(DEEPEST) {
                 halvings.set(depth as usize, Halving { difference, high, ..Halving::default() });
                 (patch, coarse, parent) = (patch.half(false), low, difference);
                 continue;

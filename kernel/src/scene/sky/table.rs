@@ -179,7 +179,7 @@ impl<'a> Table<'a> {
         if most <= 0.0 || 2 * aside + 3 >= self.columns {
             return None;
         }
-        let wrapped = |column: isize| column.rem_euclid(self.columns as isize) as usize;
+        let wrapped = |column: isize| column.rem_euclid((self.columns as isize).max(1)) as usize;
         let left = wrapped(column as isize - aside as isize);
         let peak = place * self.bands;
         let spectrum = self.samples.get(peak..peak + self.bands)?;
