@@ -112,8 +112,9 @@ fn counted_area(areas: &[f64]) -> f64 {
         while area <= limit && size > 0 {
             (size, limit) = (size - 1, 0.5 * limit);
         }
-        sums[size] += area;
-        counts[size] += 1;
+        if let (Some(sum), Some(count)) = (sums.get_mut(size), counts.get_mut(size)) {
+            (*sum, *count) = (*sum + area, *count + 1);
+        }
     }
     let mut total = 0.0;
     for (sum, count) in sums.into_iter().zip(counts).filter(|(_, count)| *count > 0) {
