@@ -4,6 +4,7 @@
 mod kernel;
 mod support;
 
+use blik_kernel::base::budget::ErrorBudget;
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, MAX_RESOLUTION, Projection, Sampling};
 use blik_kernel::coupling::{Block, Coupling};
@@ -311,11 +312,11 @@ fn memory_of_the_wrong_size() {
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     let needed = Cut::bytes(2, 1e-2).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
-    let error = Cut::new(&scene, 1e-2, &mut small).unwrap_err();
+    let error = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     let mut trees = vec![0; needed];
-    let cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();
+    let cut = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
     let needed = Elements::bytes(&cut).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
     let error = Elements::new(&scene, &cut, &mut small).unwrap_err();
@@ -392,10 +393,18 @@ fn outputs_of_the_wrong_size() {
 
         let mut values = [7.0; 5];
         let mut trees = vec![0; Cut::bytes(solved.scene.facets(), 1e-3).unwrap()];
-        let mut cut = Cut::new(solved.scene, 1e-3, &mut trees).unwrap();
+        let mut cut = Cut::new(solved.scene, &ErrorBudget::new(1e-3, 1e-3), &mut trees).unwrap();
         let (work, _) = cut.work();
-        let error =
-            work.probe(solved.scene, solved.bvh, &Facing::NONE, (16, 1e-3), 0..6, &mut values).unwrap_err();
+        let error = work
+            .probe(
+                solved.scene,
+                solved.bvh,
+                &Facing::NONE,
+                (16, &ErrorBudget::new(1e-3, 1e-3)),
+                0..6,
+                &mut values,
+            )
+            .unwrap_err();
         is(error, Error::Length { what: "unevenness", expected: 6, given: 5 }, &["unevenness"]);
         assert_eq!(values, [7.0; 5]);
     });

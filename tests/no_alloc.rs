@@ -8,6 +8,7 @@ mod stages;
 mod support;
 
 use blik_kernel::Error;
+use blik_kernel::base::budget::ErrorBudget;
 use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
@@ -158,12 +159,14 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
         let bytes = Facing::bytes(&scene, true).unwrap();
         short("planes", bytes, |memory| Facing::new(&scene, &bvh, true, memory).err());
-        short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| Cut::new(&scene, 1e-2, memory).err());
+        short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| {
+            Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), memory).err()
+        });
         let mut trees = vec![0; Cut::bytes(facets, 1e-2).unwrap()];
-        let mut cut = Cut::new(&scene, 1e-2, &mut trees).unwrap();
+        let mut cut = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
         let (work, _) = cut.work();
         wrong("unevenness", facets, f64::MAX, |out| {
-            work.probe(&scene, &bvh, &Facing::NONE, (16, 1e-2), 0..facets, out).err()
+            work.probe(&scene, &bvh, &Facing::NONE, (16, &ErrorBudget::new(1e-2, 1e-2)), 0..facets, out).err()
         });
         let bytes = Elements::bytes(&cut).unwrap();
         short("elements", bytes, |memory| Elements::new(&scene, &cut, memory).err());
@@ -184,7 +187,8 @@ fn with_stages(check: impl FnOnce(&System<'_>, &Bvh<'_>, &RowSettings)) {
         let (light, direct, sun) = (&light, &direct[..], &lit[..]);
         let straight = Straight::default();
         let system = System { scene, elements, coupling: &coupling, light, direct, sun, straight, shape };
-        check(&system, geometry.bvh(), &RowSettings::new(scene, 5e-2, None, true, false));
+        let rows = RowSettings::new(scene, &ErrorBudget::new(5e-2, 5e-2), None, true, false);
+        check(&system, geometry.bvh(), &rows);
     });
 }
 

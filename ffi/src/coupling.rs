@@ -200,7 +200,7 @@ fn cut<'s>(
     runner: &mut Runner,
     scratch: &'s mut [u8],
 ) -> Result<Cut<'s>, blik_error> {
-    let mut cut = Cut::new(&base.scene, settings.asked.tolerance, scratch)?;
+    let mut cut = Cut::new(&base.scene, &settings.asked.budget, scratch)?;
     stages::refine(&base.scene, &base.bvh, facing, &settings.asked, &mut cut, runner)?;
     Ok(cut)
 }
@@ -214,7 +214,7 @@ fn elements(
     cutter: &mut Cutter,
 ) -> Result<Elements<'static>, blik_error> {
     // the trees stand at the end of the memory while the elements are made at its front
-    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.asked.tolerance)?;
+    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.asked.budget.solution)?;
     let whole = cutter.lend();
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
@@ -235,11 +235,12 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
         rows = fewer;
     }
     let unknowns =
-        subdivide::most_elements(base.scene.facets(), settings.asked.tolerance) * base.scene.sides();
+        subdivide::most_elements(base.scene.facets(), settings.asked.budget.solution) * base.scene.sides();
     let row = stages::least_bytes(&base.scene, &rows, unknowns)?;
     let table = stages::places(unknowns) * (size_of::<BlockPlace>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
     let planes = Facing::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
-    let parts = [head::<blik_coupling>(), element_bytes(base, settings.asked.tolerance)?, table, row, planes];
+    let parts =
+        [head::<blik_coupling>(), element_bytes(base, settings.asked.budget.solution)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
 
@@ -468,7 +469,7 @@ mod owned {
         // SAFETY: dropped at the end of this function, after the last use.
         let facing =
             Facing::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
-        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.asked.tolerance)?)?;
+        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.asked.budget.solution)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
         let cut = cut(base, &facing, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(&cut)?)?;

@@ -6,8 +6,8 @@ use crate::solution::blik_solution;
 use crate::status::*;
 use crate::types::{Place, Sized_, read, sized};
 use crate::view::blik_tally;
+use blik_kernel::base::budget::ErrorBudget;
 use blik_kernel::policy::{self, Limit, Round};
-use blik_kernel::settings::Settings as Asked;
 
 /// The largest part of the estimate of a [`blik_report`].
 pub type blik_limit = i32;
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn blik_get_report(
         }
         let coupling = solution.coupling.info()?;
         let (base, numbers) = (solution.coupling.base, &solution.record.numbers);
-        let Asked { tolerance, image_tolerance, .. } = solution.coupling.settings.asked;
+        let ErrorBudget { solution: tolerance, image, .. } = solution.coupling.settings.asked.budget;
         let (estimate, limit) = policy::estimate(&tally.kernel(), numbers.solver);
         to.write(blik_report {
             struct_size: size_of::<blik_report>(),
@@ -176,7 +176,7 @@ pub unsafe extern "C" fn blik_get_report(
             elements: coupling.elements,
             bytes: base.scene.memory() + base.bvh.memory() + coupling.bytes + solution.bytes,
             sweeps: numbers.sweeps as u32,
-            tolerance_met: i32::from(estimate <= image_tolerance),
+            tolerance_met: i32::from(estimate <= image),
             limited_by: match limit {
                 Limit::Nothing => BLIK_LIMIT_NOTHING,
                 Limit::Visibility => BLIK_LIMIT_VISIBILITY,

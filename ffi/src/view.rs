@@ -557,7 +557,7 @@ pub unsafe extern "C" fn blik_signatures(
             (input(directions, numbers)?, out)
         };
         let cells = if cells == 0 {
-            policy::signature_cells(solution.coupling.settings.asked.tolerance)
+            policy::signature_cells(solution.coupling.settings.asked.budget.solution)
         } else {
             cells
         };

@@ -142,7 +142,7 @@ impl<'m> Baked<'m> {
             version: VERSION,
             bytes: bytes as u64,
             checksum: 0,
-            tolerance: self.settings.tolerance,
+            tolerance: self.settings.budget.solution,
             max_bounces: self.settings.max_bounces.map_or(u64::MAX, u64::from),
             flags: u64::from(self.settings.all_irradiances) | u64::from(self.settings.directional) << 1,
             blocks: self.blocks.len() as u64,

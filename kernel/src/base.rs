@@ -1,6 +1,7 @@
 //! What all wings stand on: errors, caller memory, arithmetic and vectors, sequences and rules of integration.
 
 pub mod arena;
+pub mod budget;
 pub mod error;
 pub(crate) mod index;
 pub mod math;

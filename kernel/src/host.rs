@@ -228,8 +228,7 @@ impl Host {
         if let Some(reference) = &reference {
             light::check_reference(reference, input.bands)?;
         }
-        let mut report =
-            Report { tolerance: settings.image_tolerance, bands: input.bands, ..Report::default() };
+        let mut report = Report { tolerance: settings.budget.image, bands: input.bands, ..Report::default() };
         let mut clock = Clock::start();
         let GeometryMemory { scene: scene_memory, bvh: bvh_memory, elements: element_memory, slabs } = memory;
         *scene_memory = Memory::new(Scene::bytes(input)?);
@@ -246,8 +245,8 @@ impl Host {
         let wanted = settings::planes(&scene, &rows);
         let mut planes = Memory::new(Facing::bytes(&scene, wanted)?);
         let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
-        let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.tolerance)?);
-        let mut cut = Cut::new(&scene, settings.tolerance, trees.bytes_mut())?;
+        let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.budget.solution)?);
+        let mut cut = Cut::new(&scene, &settings.budget, trees.bytes_mut())?;
         let mut run = Run::new(self);
         report.rays.visibility += stages::refine(&scene, &bvh, &facing, &settings, &mut cut, &mut run)?;
         *element_memory = Memory::new(Elements::bytes(&cut)?);
@@ -363,7 +362,7 @@ impl Host {
         report.rays.primary = tally.primary + rays;
         report.rays.chain += tally.chain;
         report.seconds.image = clock.lap();
-        report.finish(&tally, columns * rows);
+        report.finish(&tally, columns * rows, &lit.geometry.settings.budget);
         Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
     }
 
@@ -487,7 +486,7 @@ impl Lit<'_> {
 
     /// The cells of a signature along `forward`.
     fn view(&self, solved: &Solved<'_>, forward: Vec3) -> Result<View, Error> {
-        View::new(solved, forward, settings::signature_cells(self.geometry.settings.tolerance))
+        View::new(solved, forward, settings::signature_cells(self.geometry.settings.budget.solution))
     }
 
     /// What the sums over all cells of a signature along `forward` say, and their rays.

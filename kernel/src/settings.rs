@@ -3,13 +3,13 @@
 //! Every layer over the kernel (the owning one, the C interface, bare metal) decides here, so that all compute the
 //! same bits.
 
+use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
 use crate::base::math::{clamp, pow};
 use crate::coupling::rows::RowSettings;
 use crate::coupling::word::LONGEST;
 use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::Shape;
-use crate::radiosity::sun_image;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
 use crate::view::chain::ChainSettings;
@@ -17,10 +17,8 @@ use crate::view::chain::ChainSettings;
 /// What a caller asks of the stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Wanted error of the diffuse solution, relative to the reference radiance.
-    pub tolerance: f64,
-    /// Wanted error of images; no more than `tolerance`.
-    pub image_tolerance: f64,
+    /// The wanted errors and their shares; that of images is no more than that of the solution.
+    pub budget: ErrorBudget,
     /// Light reflected more often does not count; `None`: by tolerance.
     pub max_bounces: Option<u32>,
     /// Irradiance of all facets is wanted, also of those that reflect nothing diffusely.
@@ -41,8 +39,7 @@ impl Settings {
         let image = image_tolerance.unwrap_or(tolerance);
         check_tolerance(image)?;
         Ok(Settings {
-            tolerance,
-            image_tolerance: image.min(tolerance),
+            budget: ErrorBudget::new(tolerance, image.min(tolerance)),
             max_bounces: None,
             all_irradiances: false,
             directional: true,
@@ -52,7 +49,7 @@ impl Settings {
 
     /// How the rows of a scene's coupling are computed.
     pub fn rows(&self, scene: &Scene<'_>) -> RowSettings {
-        RowSettings::new(scene, self.tolerance, self.max_bounces, self.directional, self.all_irradiances)
+        RowSettings::new(scene, &self.budget, self.max_bounces, self.directional, self.all_irradiances)
     }
 
     /// As [`Settings::rows`], for so many rows within the budget of rays.
@@ -61,11 +58,25 @@ impl Settings {
         self.ray_budget.map_or(rows, |budget| rows.within(count, budget))
     }
 
-    /// How the chains of images are followed; `rays` is the coupling's.
+    /// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for
+    /// that as another round of a coupling that took `rays`.
     pub fn chains(&self, rays: u64) -> ChainSettings {
-        chains((self.image_tolerance, self.tolerance), self.max_bounces, rays)
+        let ErrorBudget { solution, image, gathering, .. } = self.budget;
+        let growth = (solution / image) * (solution / image);
+        ChainSettings {
+            budget: self.budget,
+            max_bounces: self.max_bounces,
+            gather: gathering,
+            rays: (rays as f64 * ROUND_GROWTH * growth) as u64,
+            pixel: (f64::INFINITY, 0.0),
+            apart: false,
+        }
     }
 }
+
+/// Rays of a round whose tolerance is half of the last one's, over those of the last: twice as many rows of nearly three
+/// times the rays, less what needs none. Times the square of how much finer the image is than the solution.
+const ROUND_GROWTH: f64 = 4.0;
 
 /// Refuses a tolerance outside 1e-6 to 0.1.
 pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {
@@ -92,15 +103,10 @@ pub fn probing(rows: &RowSettings) -> u32 {
     (rows.rays / 16).clamp(16, crate::coupling::subdivide::MOST_RAYS)
 }
 
-/// Relative error of the sky's irradiance on a plane.
-pub fn sky_accuracy(tolerance: f64) -> f64 {
-    (0.05 * tolerance).max(1e-9)
-}
-
-/// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the tolerance by
-/// what it adds to the element's radiance.
-pub fn straight_goal(scene: &Scene<'_>, tolerance: f64) -> f64 {
-    0.5 * tolerance / scene.largest_diffuse().max(0.1)
+/// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the images' by what
+/// it adds to the element's radiance.
+pub fn straight_goal(scene: &Scene<'_>, budget: &ErrorBudget) -> f64 {
+    budget.straight / scene.largest_diffuse().max(0.1)
 }
 
 /// Orders of reflection are kept apart only where their number is bounded, and small; one level counts all.
@@ -110,13 +116,8 @@ pub fn shape(max_bounces: Option<u32>, bands: usize) -> Shape {
 }
 
 /// How the beams that mirrors throw are traced; `None` where the scene has no use for them.
-pub fn beams(
-    scene: &Scene<'_>,
-    sun: &Sun<'_>,
-    tolerance: f64,
-    max_bounces: Option<u32>,
-    all_irradiances: bool,
-) -> Option<BeamSettings> {
+pub fn beams(scene: &Scene<'_>, sun: &Sun<'_>, settings: &Settings) -> Option<BeamSettings> {
+    let Settings { budget, max_bounces, all_irradiances, .. } = *settings;
     let mirrors = |lobe: bool| {
         let is_one = |m: usize| scene.mirror(m) != NO_MIRROR && scene.gloss(m).is_some() == lobe;
         (0..scene.materials()).any(is_one)
@@ -126,30 +127,17 @@ pub fn beams(
     if scene.largest_specular() == 0.0 || !wanted || max_bounces == Some(0) {
         return None;
     }
-    let rays = clamp(100.0 / tolerance, 32768.0, 1e8);
+    let rays = clamp(BEAM_RAYS / budget.image, FEWEST_BEAM_RAYS, MOST_BEAM_RAYS);
     let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
-    Some(BeamSettings::new(scene, sun, rays, sun_image::CUTOFF * tolerance, mirrors))
+    Some(BeamSettings::new(scene, sun, rays, budget.beam_chains, mirrors))
 }
 
-/// Elements of which so many tolerances of error are expected are mended by rays from points in every image: few are.
-const GATHER: f64 = 3.0;
+/// Rays of all beams together, times the images' error: an element that a hundredth of them meets is wrong by n^-3/4 of that.
+const BEAM_RAYS: f64 = 100.0;
 
-/// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for that
-/// as another round of a coupling that took `rays`, made for the solution's tolerance, the second of the two.
-pub fn chains((tolerance, solution): (f64, f64), max_bounces: Option<u32>, rays: u64) -> ChainSettings {
-    let growth = (solution / tolerance) * (solution / tolerance);
-    ChainSettings {
-        cutoff: 0.05 * tolerance,
-        max_bounces,
-        tolerance,
-        sky_error: sky_accuracy(tolerance),
-        gather: GATHER,
-        rays: (rays as f64 * 4.0 * growth) as u64,
-        solution,
-        pixel: (f64::INFINITY, 0.0),
-        apart: false,
-    }
-}
+/// Fewest and most rays of all beams: fewer leave elements unmet that others' shapes hide, more take minutes.
+const FEWEST_BEAM_RAYS: f64 = 32768.0;
+const MOST_BEAM_RAYS: f64 = 1e8;
 
 /// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.
 pub fn signature_cells(tolerance: f64) -> usize {

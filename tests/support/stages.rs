@@ -221,7 +221,7 @@ pub fn run(
     let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
     let facing = Facing::new(&scene, &bvh, !directional, &mut work.planes)?;
     let asked = settings::Settings { directional, ..settings::Settings::new(plan.tolerance, None)? };
-    let mut cut = Cut::new(&scene, plan.tolerance, &mut work.trees)?;
+    let mut cut = Cut::new(&scene, &asked.budget, &mut work.trees)?;
     let mut run = Backward { parts };
     counts.visibility += stages::refine(&scene, &bvh, &facing, &asked, &mut cut, &mut run)?;
     let bytes = Elements::bytes(&cut)?;

@@ -27,6 +27,8 @@ pub struct Report {
     pub certified: Certified,
     /// The largest part of the estimate.
     pub limited_by: &'static str,
+    /// Shares of the error budget, by name.
+    pub budget: BTreeMap<&'static str, Share>,
     /// Rounds in which the image was computed, each finer than the one before.
     pub rounds: u32,
     /// Facets of the mesh.
@@ -65,6 +67,13 @@ pub struct Certified {
     pub dropped: f64,
     /// What the bounds do not cover.
     pub excludes: Vec<&'static str>,
+}
+
+/// A share of the error budget: what might be spent and what was, `None` where that is measured as a part of another share.
+#[derive(Serialize)]
+pub struct Share {
+    pub allowed: f64,
+    pub spent: Option<f64>,
 }
 
 /// Counts of pairs.
@@ -144,6 +153,11 @@ impl Report {
                 excludes: of.certified.excludes,
             },
             limited_by: of.limited_by,
+            budget: of
+                .budget
+                .into_iter()
+                .map(|share| (share.name, Share { allowed: share.allowed, spent: share.spent }))
+                .collect(),
             rounds: of.rounds,
             facets: of.facets,
             degenerate_facets: of.degenerate_facets,

@@ -200,6 +200,7 @@ impl<'m> Elements<'m> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::budget::ErrorBudget;
     use crate::scene::{MaterialInput, SceneInput};
 
     #[test]
@@ -219,7 +220,7 @@ mod tests {
         let scene = Scene::new(&input, &mut memory).unwrap();
         for cuts in [0, 1, 3, 6] {
             let mut memory = [0u8; 1 << 18];
-            let mut cut = Cut::new(&scene, 1e-3, &mut memory).unwrap();
+            let mut cut = Cut::new(&scene, &ErrorBudget::new(1e-3, 1e-3), &mut memory).unwrap();
             // the first facet and then always one corner and the middle of what was cut
             for _ in 0..cuts {
                 let (_, values) = cut.work();

@@ -19,6 +19,7 @@ use super::sink::Sink;
 use super::word::{EMPTY, LONGEST};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::base::arena::{Arena, Need};
+use crate::base::budget::ErrorBudget;
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, clamp, frame, pow};
@@ -138,11 +139,11 @@ impl RowSettings {
         self
     }
 
-    /// Settings for a tolerance: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
-    /// kept at the tolerance.
+    /// Settings for an error budget: a row's error, about 0.9 n^-2/3 at its worst, times the diffuse reflectance is
+    /// kept at the solution's.
     pub fn new(
         scene: &Scene<'_>,
-        tolerance: f64,
+        budget: &ErrorBudget,
         max_bounces: Option<u32>,
         directional: bool,
         all: bool,
@@ -150,8 +151,8 @@ impl RowSettings {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
         let longest = super::word::LONGEST as u32;
         RowSettings {
-            rays: whole(pow(0.9 * diffuse / tolerance, 1.5)),
-            cutoff: 1e-3 * tolerance,
+            rays: whole(pow(0.9 * diffuse / budget.solution, 1.5)),
+            cutoff: budget.row_chains,
             mirrors: max_bounces.unwrap_or(longest).min(longest),
             directional,
             all,

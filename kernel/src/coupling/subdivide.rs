@@ -7,6 +7,7 @@
 //! are too far from each other to tell.
 
 use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::budget::ErrorBudget;
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, span};
 use crate::base::math::{Vec3, frame, sqrt};
@@ -132,10 +133,6 @@ fn counted_area(areas: &[f64]) -> f64 {
 /// Elements that a mesh of any facets may have beyond them, at a tolerance of 2e-3.
 const COARSE: f64 = 4096.0;
 
-/// Mean square error that elements may leave, over the square of the tolerance: what arrives differs from what the
-/// probing rays can tell before light is known.
-const GOAL: f64 = 0.06;
-
 /// The most elements of a scene of `facets` facets: 1 + 2e-3/tolerance times as many, and some more for coarse meshes.
 pub fn most_elements(facets: usize, tolerance: f64) -> usize {
     let finer = 2e-3 / tolerance;
@@ -163,10 +160,10 @@ impl<'m> Cut<'m> {
     }
 
     /// Every facet whole, and to be probed.
-    pub fn new(scene: &Scene<'_>, tolerance: f64, memory: &'m mut [u8]) -> Result<Cut<'m>, Error> {
+    pub fn new(scene: &Scene<'_>, budget: &ErrorBudget, memory: &'m mut [u8]) -> Result<Cut<'m>, Error> {
         let facets = scene.facets();
-        let mut arena = Arena::new(memory, Cut::bytes(facets, tolerance)?)?;
-        let capacity = most_nodes(facets, tolerance);
+        let mut arena = Arena::new(memory, Cut::bytes(facets, budget.solution)?)?;
+        let capacity = most_nodes(facets, budget.solution);
         let nodes = arena.take::<Node>(capacity)?;
         let unevenness = arena.take::<f64>(capacity)?;
         for (facet, (node, expected)) in nodes.iter_mut().zip(unevenness.iter_mut()).take(facets).enumerate()
@@ -182,8 +179,8 @@ impl<'m> Cut<'m> {
             facets,
             area: counted_area(scene.areas()),
             settled: 0.0,
-            goal: GOAL * tolerance * tolerance,
-            most: most_elements(facets, tolerance),
+            goal: budget.elements,
+            most: most_elements(facets, budget.solution),
         })
     }
 
@@ -293,7 +290,7 @@ impl Work<'_> {
         scene: &Scene<'_>,
         bvh: &Bvh<'_>,
         facing: &Facing<'_>,
-        (rays, tolerance): (u32, f64),
+        (rays, budget): (u32, &ErrorBudget),
         range: Range<usize>,
         out: &mut [f64],
     ) -> Result<u64, Error> {
@@ -301,7 +298,7 @@ impl Work<'_> {
             return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
         }
         let rays = rays.clamp(FEWEST_RAYS, MOST_RAYS);
-        let many = most_elements(scene.facets(), tolerance) as f64;
+        let many = most_elements(scene.facets(), budget.solution) as f64;
         let mut probe = Probe { scene, bvh, facing, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
             let expected = core::mem::take(value);
@@ -311,8 +308,7 @@ impl Work<'_> {
                 continue;
             }
             let share = Path(node.path).share() * scene.areas().at(facet) / self.area;
-            probe.negligible =
-                0.25 * GOAL * tolerance * tolerance / (rho * rho) * (1.0 / (many * share)).max(1.0);
+            probe.negligible = 0.25 * budget.elements / (rho * rho) * (1.0 / (many * share)).max(1.0);
             for side in 0..scene.sides() {
                 if node.path == 0 && opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
                     continue;

@@ -1,5 +1,6 @@
 //! What comes back with every result: how good it is, what was done, what was not needed.
 
+use crate::base::budget::ErrorBudget;
 use crate::coupling::{ABSENT, Coupling, OPEN};
 use crate::scene::Scene;
 use crate::scene::light::Light;
@@ -26,6 +27,8 @@ pub struct Report {
     pub certified: Certified,
     /// The largest part of the estimate.
     pub limited_by: &'static str,
+    /// The error budget, share by share.
+    pub budget: Vec<BudgetShare>,
     /// Rounds in which the image was computed ([`super::Rounds`]); seconds and rays are those of all of them.
     pub rounds: u32,
     pub facets: usize,
@@ -53,6 +56,17 @@ pub struct Certified {
     pub dropped: f64,
     /// What no bound covers.
     pub excludes: Vec<&'static str>,
+}
+
+/// A share of the error budget ([`ErrorBudget`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BudgetShare {
+    /// The field of [`ErrorBudget`].
+    pub name: &'static str,
+    /// What might be spent.
+    pub allowed: f64,
+    /// What was spent, as the estimate or a bound has it; `None` where it is measured as a part of another share alone.
+    pub spent: Option<f64>,
 }
 
 /// Facet pairs.
@@ -175,8 +189,26 @@ impl Report {
         self.skip("rows without a sun", if light.sun.is_none() { rows as u64 } else { 0 });
     }
 
+    /// The shares of a budget beside what an image spent of them.
+    fn shares(&self, budget: &ErrorBudget, tally: &Tally) -> Vec<BudgetShare> {
+        let [visibility, sampling, solver, tail] =
+            estimate::parts(tally, self.certified.solver).map(|(_, error)| Some(error));
+        let share = |name, allowed, spent| BudgetShare { name, allowed, spent };
+        std::vec![
+            share("image", budget.image, Some(self.error_estimate)),
+            share("solution", budget.solution, visibility),
+            share("pixels", budget.pixels, sampling),
+            share("solver", budget.solver, solver),
+            share("chains", budget.chains, tail),
+            share("row_chains", budget.row_chains, Some(self.certified.dropped)),
+            share("sky", budget.sky, None),
+            share("beam_chains", budget.beam_chains, None),
+            share("lobes", budget.lobes, None),
+        ]
+    }
+
     /// Puts the part of an image of so many pixels in and draws the conclusions.
-    pub(super) fn finish(&mut self, tally: &Tally, pixels: usize) {
+    pub(super) fn finish(&mut self, tally: &Tally, pixels: usize, budget: &ErrorBudget) {
         self.skip("pixels beside the object", (pixels as u64).saturating_sub(tally.object_pixels));
         self.skip("pixels of which the centre is enough", (pixels as u64).saturating_sub(tally.refined));
         self.certified.chain_tail = tally.tail;
@@ -184,5 +216,6 @@ impl Report {
         let (error, limit) = estimate::estimate(tally, self.certified.solver);
         (self.error_estimate, self.limited_by) = (error, limit.name());
         self.tolerance_met = self.error_estimate <= self.tolerance;
+        self.budget = self.shares(budget, tally);
     }
 }

@@ -45,19 +45,14 @@ const CLOSED: f64 = 1.0 - 1e-12;
 
 /// Solutions' worth of memory that [`History`] needs beside the two that plain sweeps work on: 0 where the scene's
 /// reflectances need no faster ones.
-pub fn kept(scene: &Scene<'_>, tolerance: f64, max_bounces: Option<u32>) -> usize {
+pub fn kept(scene: &Scene<'_>, goal: f64, max_bounces: Option<u32>) -> usize {
     // mirrors of at most s bring at most 1 + s + s^2 + ... times a row's share of the hemisphere
     let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
-    let few = sweeps(q.min(1.0), goal(tolerance)) <= PLAIN;
+    let few = sweeps(q.min(1.0), goal) <= PLAIN;
     if few || max_bounces.is_some() { 0 } else { KEPT + 1 }
 }
 
-/// The solver's share of the tolerance.
-fn goal(tolerance: f64) -> f64 {
-    1e-3 * tolerance
-}
-
-/// The faster sweeps go on to this share of it: they are for rooms that shine many times brighter than what lights them,
+/// Share of the goal that the faster sweeps go on to: they are for rooms that shine many times brighter than what lights them,
 /// and where mirrors brighten that once more.
 const FINER: f64 = 1e-2;
 
@@ -133,8 +128,7 @@ impl Pace {
 impl Solver {
     /// Before the first sweep of a system of contraction `q` (the largest over all rows). `inverse`: the bound that
     /// [`Solver::unit`] found, where [`Solver::is_closed`] asks for it; `fast`: there is a [`History`].
-    pub fn new(q: f64, inverse: Option<f64>, tolerance: f64, max_bounces: Option<u32>, fast: bool) -> Solver {
-        let goal = goal(tolerance);
+    pub fn new(q: f64, inverse: Option<f64>, goal: f64, max_bounces: Option<u32>, fast: bool) -> Solver {
         let inverse = inverse.unwrap_or(1.0 / (1.0 - q).max(f64::MIN_POSITIVE));
         let needed = sweeps(q, goal);
         let fast = fast && max_bounces.is_none() && needed > PLAIN;
@@ -388,7 +382,7 @@ mod tests {
             let g = corridor(n, q);
             // what is at one end is not at the other: not the uniform solution of the first step
             let b: Vec<f64> = (0..n).map(|i| if i < n / 3 { 1.0 } else { 0.0 }).collect();
-            let (x, _, solver) = solve(&g, &b, Solver::new(q, None, 1e-3, None, true));
+            let (x, _, solver) = solve(&g, &b, Solver::new(q, None, 1e-6, None, true));
             // energy: (1 - q) times the sum is what is sent out; rounding of 1 - q beside it
             let (sum, sent) = (x.iter().sum::<f64>() * (1.0 - q), b.iter().sum::<f64>());
             assert!((sum / sent - 1.0).abs() < 1e-6, "{n} cells, q {q}: {sum}, not {sent}");

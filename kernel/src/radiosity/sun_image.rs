@@ -69,9 +69,6 @@ pub const SAME: f64 = 1e-14;
 /// beyond [`SAME`].
 const SEEN: f64 = 2.0 * SAME;
 
-/// Chains of mirrors end where the product of their reflectances falls below so many tolerances.
-pub const CUTOFF: f64 = 1e-3;
-
 /// Bits of each coordinate of a direction.
 const BITS: u32 = 31;
 

@@ -38,7 +38,7 @@ pub fn refine<X: Executor>(
     loop {
         let (work, unevenness) = cut.work();
         let Count(traced) = run.rows(unevenness, 1, CUT_SHARE, |range, out| {
-            work.probe(scene, bvh, facing, (probing, settings.tolerance), range, out).map(Count)
+            work.probe(scene, bvh, facing, (probing, &settings.budget), range, out).map(Count)
         })?;
         rays += traced;
         if !cut.refine(scene) {

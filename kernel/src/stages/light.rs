@@ -74,7 +74,7 @@ pub(super) fn beam_settings(
     settings: &Settings,
 ) -> Option<BeamSettings> {
     let sun = light.sun.as_ref()?;
-    settings::beams(scene, sun, settings.image_tolerance, settings.max_bounces, settings.all_irradiances)
+    settings::beams(scene, sun, settings)
 }
 
 impl Sizes {
@@ -85,7 +85,7 @@ impl Sizes {
         light: &Light<'_>,
         settings: &Settings,
     ) -> Result<Sizes, Error> {
-        let Settings { tolerance, max_bounces, .. } = *settings;
+        let Settings { budget, max_bounces, .. } = *settings;
         let shape = settings::shape(max_bounces, scene.bands());
         let (mut beams, mut places) = (0, 0);
         if let Some(settings) = beam_settings(scene, light, settings) {
@@ -93,7 +93,7 @@ impl Sizes {
             places = sun_image::places(elements.facet_sides());
         }
         let straight = light.sky.as_ref().is_some_and(|sky| straight::basis(bvh, sky).is_some());
-        let sweeps = || 2 + solver::kept(scene, tolerance, max_bounces);
+        let sweeps = || 2 + solver::kept(scene, budget.solver, max_bounces);
         Ok(Sizes {
             solution: SolutionSize { shape, unknowns: elements.unknowns(), places, straight },
             orders: if shape.levels == 1 { sweeps() } else { shape.levels + 1 },
@@ -172,7 +172,7 @@ impl Lighting<'_> {
             Some(sky) => {
                 super::straight::fill(self, memory, scratch, run)?;
                 let straight = Straight { values: memory.straight, variance: memory.straight_variance };
-                let accuracy = settings::sky_accuracy(settings.image_tolerance);
+                let accuracy = settings.budget.sky;
                 run.rows(scratch.direct, shape.stride(), SHARES[0], |range, out| {
                     let sky = (sky, &straight);
                     direct::sky_rows(scene, elements, coupling, sky, accuracy, range, shape, out)

@@ -169,7 +169,7 @@ impl Solve<'_> {
         bounds: &mut Option<Bounds>,
         run: &mut X,
     ) -> Result<Solver, X::Error> {
-        let Settings { tolerance, max_bounces, .. } = *self.settings;
+        let Settings { budget, max_bounces, .. } = *self.settings;
         let (known, mut before) = (bounds.is_some(), 0);
         let Bounds { q, inverse } = match bounds {
             Some(bounds) => *bounds,
@@ -183,7 +183,7 @@ impl Solve<'_> {
         if !known || max_bounces.is_some() {
             self.start(from, run)?;
         }
-        let mut solver = Solver::new(q, inverse, tolerance, max_bounces, !history.is_empty());
+        let mut solver = Solver::new(q, inverse, budget.solver, max_bounces, !history.is_empty());
         let ends =
             self.iterate(&mut solver, [&mut *from, &mut *to], history, run, |range, from, to, relax| {
                 self.system.relaxed_sweep(range, from, to, self.reference, relax)

@@ -38,7 +38,7 @@ pub(super) fn fill<X: Executor>(
 ) -> Result<(), X::Error> {
     let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
     let (Some(sky), false) = (&light.sky, memory.straight.is_empty()) else { return Ok(()) };
-    let goal = settings::straight_goal(scene, settings.image_tolerance);
+    let goal = settings::straight_goal(scene, &settings.budget);
     let looking = Looking { scene, bvh, elements, coupling, sky, reference: memory.reference, goal };
     let (bands, all) = (scene.bands(), elements.unknowns());
     let (part, stride) = (piece(bands)?, straight::stride(bands));

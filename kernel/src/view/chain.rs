@@ -14,6 +14,7 @@ pub(crate) use outlook::{Outlook, Way};
 use straight::OpenAt;
 
 use crate::base::arena::plain_table;
+use crate::base::budget::ErrorBudget;
 use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
@@ -31,21 +32,15 @@ use outlook::Toward;
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainSettings {
-    /// Chains end where what they can still bring falls below this share of the reference radiance.
-    pub cutoff: f64,
-    /// Light reflected more often does not count; `None`: by `cutoff` alone.
+    /// The wanted errors and their shares.
+    pub budget: ErrorBudget,
+    /// Light reflected more often does not count; `None`: by the budget alone.
     pub max_bounces: Option<u32>,
-    /// Share of the reference radiance that a sampled lobe or penumbra may be wrong by.
-    pub tolerance: f64,
-    /// Relative error of the sky's irradiance on a plane.
-    pub sky_error: f64,
-    /// Where more than so many tolerances of error are expected of an element, rays from the point itself find what arrives
+    /// Where an error above this many of the images' is expected of an element, rays from the point itself find what arrives
     /// there.
     pub gather: f64,
     /// Where mending all pixels is expected to take at most so many rays, all are.
     pub rays: u64,
-    /// Tolerance of the solution.
-    pub solution: f64,
     /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
     pub pixel: (f64, f64),
     /// Whether what the first mirror or narrow lobe shows of the sun and its images is left out: it is found apart.
@@ -62,16 +57,17 @@ impl ChainSettings {
     /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
     /// elements are mended.
     pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
+        let ErrorBudget { solution, image, .. } = self.budget;
         let all = camera.columns() * camera.rows();
-        let each = gather::usual_rays(self.tolerance / scene.largest_diffuse().max(f64::MIN_POSITIVE));
+        let each = gather::usual_rays(image / scene.largest_diffuse().max(f64::MIN_POSITIVE));
         let affords = |pixels: f64| pixels * each <= self.rays as f64;
         // counting them takes a look at every facet
-        let counts = GATHERS && self.solution > self.tolerance && scene.facets() <= all;
+        let counts = GATHERS && solution > image && scene.facets() <= all;
         let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
             GATHER_ALL
         } else {
             // most of it would have to be mended, for which a finer solution costs less: what a solution leaves at worst
-            self.gather * (self.solution / self.tolerance).max(1.0)
+            self.gather * (solution / image).max(1.0)
         };
         let area = camera.pixel_area();
         ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }
@@ -320,10 +316,6 @@ const BETWEEN: f64 = 0.09;
 /// Rays of a lobe's first set, times rho over the tolerance.
 const FIRST_RAYS: f64 = 0.24;
 
-/// A second set brings a lobe's expected error down to this many tolerances: lobes whose rays disagree fill less than
-/// a third of the pixels, and all pixels' root mean square is to meet the tolerance.
-const LOBE_GOAL: f64 = 1.5;
-
 /// Fewest and most rays of one lobe.
 const FEWEST_LOBE_RAYS: u32 = 4;
 const MOST_LOBE_RAYS: f64 = 1024.0;
@@ -471,7 +463,7 @@ impl Solved<'_> {
                 *through *= rho;
                 largest = f64::max(largest, *through);
             }
-            if largest * self.numbers.brightest < self.settings.cutoff
+            if largest * self.numbers.brightest < self.settings.budget.chains
                 || leg.mirrors as usize >= crate::coupling::word::LONGEST
             {
                 path.tail += largest * self.numbers.brightest;
@@ -587,13 +579,13 @@ impl Solved<'_> {
     /// Rays of a lobe's first set, for a lobe whose light counts `through`: what they may miss between them is small
     /// against the tolerance.
     fn first_rays(&self, through: f64) -> u32 {
-        let wanted = FIRST_RAYS * through / self.settings.tolerance;
+        let wanted = FIRST_RAYS * through / self.settings.budget.image;
         (wanted.min(MOST_LOBE_RAYS) as u32).max(FEWEST_LOBE_RAYS)
     }
 
     /// Rays of both sets, by the standard deviation of the first one's and their glare.
     fn all_rays(&self, spread: f64, glare: f64) -> u32 {
-        let goal = LOBE_GOAL * self.settings.tolerance;
+        let goal = self.settings.budget.lobes;
         let wanted = pow(LOBE_ERROR * spread / goal, 1.0 / LOBE_POWER).max(glare / goal);
         wanted.min(MOST_LOBE_RAYS) as u32
     }

@@ -50,15 +50,20 @@ const ROUNDING: f64 = 1e-7;
 /// Expected eps of eq. 16 of an image, relative to the reference radiance, and its largest part: `tally` of all its
 /// rows, `solver` the bound on the radiances' error.
 pub fn estimate(tally: &Tally, solver: f64) -> (f64, Limit) {
-    let pixels = tally.object_pixels.max(1) as f64;
-    let parts = [
-        (Limit::Visibility, CAUTION * sqrt((1.0 + FEW / sqrt(pixels)) * (tally.noise2 / pixels).max(0.0))),
-        (Limit::Sampling, UNSEEN * sqrt(tally.sampling2 / pixels)),
-        (Limit::Solver, solver),
-        (Limit::Chain, tally.tail),
-    ];
+    let parts = parts(tally, solver);
     let sum: f64 = parts.iter().map(|(_, e)| e * e).sum::<f64>()
         + if tally.object_pixels > 0 { ROUNDING * ROUNDING } else { 0.0 };
     let largest = parts.iter().fold((Limit::Nothing, 0.0), |a, &b| if b.1 > a.1 { b } else { a });
     (sqrt(sum), largest.0)
+}
+
+/// The parts of the estimate, each what its cause is expected to contribute.
+pub fn parts(tally: &Tally, solver: f64) -> [(Limit, f64); 4] {
+    let pixels = tally.object_pixels.max(1) as f64;
+    [
+        (Limit::Visibility, CAUTION * sqrt((1.0 + FEW / sqrt(pixels)) * (tally.noise2 / pixels).max(0.0))),
+        (Limit::Sampling, UNSEEN * sqrt(tally.sampling2 / pixels)),
+        (Limit::Solver, solver),
+        (Limit::Chain, tally.tail),
+    ]
 }

@@ -4,6 +4,7 @@ mod lines;
 mod thin;
 
 use crate::base::arena::{Arena, Need, plain_table};
+use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
 use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::{clamp, fabs, floor, narrow, pow, sqrt};
@@ -115,19 +116,9 @@ const LINES: f64 = 1.5;
 /// Share of the contrast with neighbours that rays which have not seen it may miss.
 const UNSEEN: f64 = 0.35;
 
-/// A pixel whose centre differs from the mean of two opposite neighbours by at most so many tolerances keeps the
-/// centre's value: an edge of that contrast brings an error of a fifth of it, and a change that is linear none.
-const FLAT: f64 = 2.0;
-
-/// The same of a pixel's difference from its neighbours, that much of which counts as a bend: what changes has details
-/// that no centre shows more often than what does not.
+/// Share of the contrast with a neighbour that counts as curvature: where radiance changes fast, detail between the pixels'
+/// centres is likelier.
 const STEEP: f64 = 0.25;
-
-/// The part of the tolerance that sampling the pixels' area may take, as root mean square over the object's pixels.
-const PART: f64 = 0.5;
-
-/// Largest error of one pixel, in tolerances.
-const LARGEST: f64 = 2.0;
 
 /// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line: what
 /// reaches less far into a pixel than a part, and ends there, is missed. The finer ones are for tolerances below [`FINE`].
@@ -375,7 +366,7 @@ impl<'a> Painter<'a, '_> {
         self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
             let centre = [0, 1, 2].map(|term| self.lines.at(at + term * bands + band)).iter().sum::<f64>();
             fabs(f64::from(*value) - f64::from(narrow(centre)))
-                > FLAT * self.solved.settings.tolerance * reference
+                > self.solved.settings.budget.flat_pixel * reference
         })
     }
 
@@ -383,7 +374,7 @@ impl<'a> Painter<'a, '_> {
     /// row's root mean square to be a small part of the tolerance.
     #[inline(never)]
     fn goal(&mut self, row: isize, columns: isize) -> f64 {
-        let tolerance = self.solved.settings.tolerance;
+        let ErrorBudget { pixels, worst_pixel, .. } = self.solved.settings.budget;
         let (mut object, mut uneven) = (0.0, 0.0);
         for j in 0..columns {
             let value = self.unevenness(row, j);
@@ -394,18 +385,14 @@ impl<'a> Painter<'a, '_> {
                 uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
             }
         }
-        if uneven > 0.0 {
-            tolerance * (PART * sqrt(object / uneven)).min(LARGEST)
-        } else {
-            LARGEST * tolerance
-        }
+        if uneven > 0.0 { (pixels * sqrt(object / uneven)).min(worst_pixel) } else { worst_pixel }
     }
 
     /// Whether a pixel keeps its centre's value.
     fn is_flat(&self, at: usize) -> bool {
         let end = at + self.stride;
         let (sampled, uneven) = (self.lines.at(end - 2), self.lines.at(end - 1));
-        sampled == 0.0 && uneven <= FLAT * self.solved.settings.tolerance
+        sampled == 0.0 && uneven <= self.solved.settings.budget.flat_pixel
     }
 
     /// Counts the error of an object pixel's area sampling.
@@ -632,7 +619,7 @@ impl<'a> Painter<'a, '_> {
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
         let goal = 0.7 * goal;
-        let parts = if solved.settings.tolerance < FINE { PARTS.1 } else { PARTS.0 };
+        let parts = if solved.settings.budget.image < FINE { PARTS.1 } else { PARTS.0 };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;

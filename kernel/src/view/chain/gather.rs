@@ -201,7 +201,7 @@ impl Solved<'_> {
     /// holds: not what narrow lobes and curved mirrors throw of the sun, nor flat ones where there are too many.
     #[inline]
     pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
-        let most = self.settings.gather * self.settings.tolerance;
+        let most = self.settings.gather * self.settings.budget.image;
         self.gathers()
             && weight * weight * variance > most * most
             && (self.light.sun.is_none() || self.finds_thrown_sun() && self.knows_images(surface))
@@ -271,7 +271,7 @@ impl Solved<'_> {
         let seed = hash2((facet * 2 + side) as u32, hash2(u, v));
         let sequence = Sequence::new(seed);
         let axes = frame(spot.surface.normal);
-        let tolerance = self.settings.tolerance / spot.weight;
+        let tolerance = self.settings.budget.image / spot.weight;
         let goal = (GOAL * tolerance) * (GOAL * tolerance);
         let least = clamp(usual_rays(tolerance), FEWEST, MOST);
         let most = clamp(MOST_TIMES * least, FEWEST, MOST) as u32;
@@ -396,7 +396,7 @@ impl Solved<'_> {
         let bands = self.shape.bands.min(BANDS);
         gathered.sky.fill(0.0);
         if let (true, None, Some(sky)) = (exact, spot.open, &self.light.sky) {
-            sky.irradiance(spot.surface.normal, self.settings.sky_error, gathered.sky.head_mut(bands));
+            sky.irradiance(spot.surface.normal, self.settings.budget.sky, gathered.sky.head_mut(bands));
         }
         // what is met is known to fill what is not open
         let scale = match spot.open {

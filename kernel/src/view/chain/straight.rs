@@ -48,7 +48,7 @@ impl<'a> Solved<'a> {
         let sky = self.light.sky.as_ref()?;
         let bands = self.shape.bands;
         let (held, _) = self.straight.of(unknown, bands)?;
-        if bands > BANDS || weight < LEAST * self.settings.tolerance {
+        if bands > BANDS || weight < LEAST * self.settings.budget.image {
             return None;
         }
         let basis = straight::basis(self.bvh, sky)?;
@@ -56,7 +56,7 @@ impl<'a> Solved<'a> {
         if !candidates.prepare(self.scene, self.bvh, (surface.facet, surface.side)) {
             return None;
         }
-        let goal = PART * self.settings.tolerance / weight;
+        let goal = PART * self.settings.budget.image / weight;
         let open = candidates.open(self.scene, self.bvh, surface.point, basis, goal)?;
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));

@@ -6,7 +6,7 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::word::LONGEST;
-use crate::radiosity::sun_image::{CUTOFF, SAME};
+use crate::radiosity::sun_image::SAME;
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
 use crate::scene::lobe::{Highlight, Lobe};
@@ -111,9 +111,9 @@ impl Solved<'_> {
                 let part = lit / all;
                 let error = at_stake * sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
                 let alone = matches!(sample, Sample::Alone(_));
-                if alone && count < MOST_DISC_RAYS && error > self.settings.tolerance {
+                if alone && count < MOST_DISC_RAYS && error > self.settings.budget.image {
                     goal *= 2;
-                } else if !alone && error > SAMPLED * self.settings.tolerance {
+                } else if !alone && error > SAMPLED * self.settings.budget.image {
                     path.sampled = true;
                 } else {
                     path.noise += error;
@@ -128,7 +128,7 @@ impl Solved<'_> {
     fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
         // what a highlight brings may be many times the reference radiance: an edge across the disc then shows far out
         let most = (f64::from(most) * clamp(at_stake, 1.0, MOST_TIMES)) as u32;
-        let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.tolerance);
+        let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.budget.image);
         (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
 
@@ -238,7 +238,7 @@ impl Solved<'_> {
                 largest = f64::max(largest, *product);
             }
             // as far as beams are traced
-            if largest < CUTOFF * self.settings.tolerance || mirrors as usize >= LONGEST {
+            if largest < self.settings.budget.beam_chains || mirrors as usize >= LONGEST {
                 return false;
             }
             mirrors += 1;

@@ -249,7 +249,7 @@ impl Glints<'_, '_> {
         let (axis, solved) = (seen.sun.direction(), self.solved);
         let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
         let scale = self.scale(seen);
-        let faint = FAINT * solved.settings.tolerance * self.whole;
+        let faint = FAINT * solved.settings.budget.image * self.whole;
         let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
         let halves = |this: &mut Self, part: &Part| {
             let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
