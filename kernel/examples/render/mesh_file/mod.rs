@@ -59,9 +59,9 @@ impl Mesh {
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let mut bounds = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for vertex in self.facets.iter().flatten().map(|i| self.vertices[*i as usize]) {
-            for axis in 0..3 {
-                bounds.0[axis] = bounds.0[axis].min(vertex[axis]);
-                bounds.1[axis] = bounds.1[axis].max(vertex[axis]);
+            for (axis, x) in vertex.into_iter().enumerate() {
+                bounds.0[axis] = bounds.0[axis].min(x);
+                bounds.1[axis] = bounds.1[axis].max(x);
             }
         }
         bounds

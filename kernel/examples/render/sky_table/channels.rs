@@ -42,7 +42,7 @@ fn layer(name: &str) -> &str {
         let word = name[..at].rsplit('.').next().unwrap_or("");
         !word.is_empty() && word.bytes().all(|b| b.is_ascii_digit()) && digit(name[at + 1..].chars().next())
     };
-    name.match_indices('.').map(|(at, _)| at).filter(|at| !decimal(*at)).last().map_or("", |at| &name[..at])
+    name.match_indices('.').map(|(at, _)| at).rfind(|at| !decimal(*at)).map_or("", |at| &name[..at])
 }
 
 /// Three colours, whatever stands before and behind all of them, and which channels are known with them. `None` where there
