@@ -10,12 +10,14 @@ import os
 import pathlib
 import platform
 import re
+import select
 import statistics
 import subprocess
 import sys
 
 import factors
 import images
+import radiance
 import rays
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -25,12 +27,22 @@ class Blik:
     """Blik's program: a line in, a line of JSON out."""
 
     def __init__(self, program):
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen([program], stdin=pipe, stdout=pipe, text=True)
+        self.program = program
+        self.start()
 
-    def __call__(self, *words):
+    def start(self):
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen([self.program], stdin=pipe, stdout=pipe, text=True)
+
+    def __call__(self, *words, seconds=None):
+        """The answer; None where it takes longer than `seconds`."""
         self.process.stdin.write(" ".join(map(str, words)) + "\n")
         self.process.stdin.flush()
+        if seconds and not select.select([self.process.stdout], [], [], seconds)[0]:
+            self.process.kill()
+            self.process.wait()
+            self.start()
+            return None
         answer = json.loads(self.process.stdout.readline())
         if "error" in answer:
             sys.exit(f"blik: {answer['error']}")
@@ -38,11 +50,11 @@ class Blik:
 
 
 def references():
-    """Folder of each reference by its name: the project's own, then those of BLIK_REFERENCES."""
+    """Scene file of each reference by its name: the project's own, then those of BLIK_REFERENCES."""
     folders = [ROOT / "tests/data/references"]
     if "BLIK_REFERENCES" in os.environ:
         folders.append(pathlib.Path(os.environ["BLIK_REFERENCES"]))
-    return {path.stem: folder for folder in reversed(folders) for path in folder.glob("*.toml")}
+    return {path.stem: path for folder in reversed(folders) for path in folder.glob("*.toml")}
 
 
 def machine():
@@ -63,7 +75,7 @@ def again(blik, found, quick):
     scene = "airplane_d0.1_s0.3_a"
     if scene not in found:
         return f"(no {scene}: name its folder with BLIK_REFERENCES)\n"
-    blik("open", found[scene] / f"{scene}.toml")
+    blik("open", found[scene])
     answers = [blik("again", 2e-3, 3 if quick else 11) for _ in range(1 if quick else 3)]
     of = lambda key: statistics.median(a[key] for a in answers)
     rows = [
@@ -82,13 +94,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blik", required=True)
     parser.add_argument("--work", type=pathlib.Path, required=True)
-    parser.add_argument("--only", choices=["images", "rays", "factors", "again"])
+    parser.add_argument("--only", choices=["images", "radiance", "again", "rays", "factors"])
+    parser.add_argument("--images", type=lambda t: t.split(","), help="only images whose names begin so")
+    parser.add_argument("--seed", type=int, default=1, help="other generated scenes")
+    parser.add_argument("--tolerances", type=lambda t: [float(x) for x in t.split(",")], default=images.TOLERANCES)
+    parser.add_argument("--folder", type=pathlib.Path, help="where images.csv and images.svg go")
     parser.add_argument("--quick", action="store_true", help="fewer runs, scenes and sizes")
     parser.add_argument("--out", type=pathlib.Path, help="append the tables to this file, too")
     options = parser.parse_args()
+    options.folder = options.folder or options.work
     blik, found = Blik(options.blik), references()
     parts = {
         "images": lambda: images.compare(blik, found, options),
+        "radiance": lambda: radiance.compare(blik, found, options),
         "again": lambda: again(blik, found, options.quick),
         "rays": lambda: rays.compare(blik, found, options),
         "factors": lambda: factors.compare(blik, options),

@@ -1,330 +1,233 @@
-"""Seconds to an image of equal error: Mitsuba 3 and Radiance on the same meshes and camera rays."""
+"""Error against processor seconds, Blik and a path tracer on Mitsuba, over references and generated scenes."""
 
-import copy
 import csv
+import dataclasses
 import math
-import os
 import statistics
-import subprocess
-import time
-import tomllib
 
 import numpy as np
 
-SCENES = ["airplane_d0.1_s0.3_a", "corner_d0.4_s0_a"]
-GOALS = {"airplane_d0.1_s0.3_a": [1.35e-3, 3e-4, 1e-4], "corner_d0.4_s0_a": [2e-3, 5e-4]}
-TOLERANCES = [2e-2, 1e-2, 5e-3, 3e-3, 2e-3, 1.4e-3, 1e-3, 7e-4, 5e-4, 3e-4, 2e-4, 1e-4]
-# Pixels of references of our own where the given ones do not show an error, and samples of each: a standard error of some
-# 2.5e-5 on the aircraft
-FINE_PIXELS, FINE_SAMPLES = 2048, 1 << 20
-# no finer run of Blik after one of so many processor seconds: the next takes several times as long
-LONGEST = 30.0
+import chart
+import paths
+import scene
+
+TOLERANCES = [1e-2, 5e-3, 2e-3, 5e-4, 2e-4]
+# no finer run of Blik after one of so many processor seconds
+LONGEST, LONGEST_QUICK = 20.0, 6.0
+# runs of Blik of which the quickest counts, while they take less than a second together
+REPEATED = 5
+# Samples of a pixel for the path tracer, as long as one image takes less than these processor seconds
+SAMPLES = [4, 16, 64, 256, 1024]
+DEAREST, DEAREST_QUICK = 6.0, 1.5
+# The truth: standard error of eps_c wanted, and rays after which it is good enough
+TRUTH, TRUTH_QUICK = (1e-4, 400_000_000), (4e-4, 30_000_000)
+# Reference images of the quick form, beside one generated scene in so many
+FEW = ["airplane_d0.4_s0_b", "airplane_d0.4_s0_csun", "corner_d0.4_s0_a", "cylinders_d0.3_s0.1_a", "mirror_box_mirror_a"]
+EVERY = 3
 
 
-class Scene:
-    """A scene file with its mesh, reference and camera rays."""
+@dataclasses.dataclass
+class Run:
+    """Blik's image at a tolerance."""
 
-    def __init__(self, folder, name):
-        self.name, self.path = name, folder / f"{name}.toml"
-        file = tomllib.loads(self.path.read_text())
-        material, camera = file["material"]["default"], file["camera"]
-        self.diffuse, self.specular = material["diffuse"], material["specular"]
-        assert file["sky"]["model"] == "uniform" and "sun" not in file and camera["kind"] == "orthographic"
-        vertices, facets = [], []
-        for line in (folder / file["mesh"]["file"]).read_text().splitlines():
-            words = line.split()
-            if words[:1] == ["v"]:
-                vertices.append([float(w) for w in words[1:4]])
-            elif words[:1] == ["f"]:
-                corners = [int(w.split("/")[0]) - 1 for w in words[1:]]
-                facets += [[corners[0], b, c] for b, c in zip(corners[1:], corners[2:])]
-        self.vertices, self.facets = np.array(vertices), np.array(facets)
-        masks = np.load(next(folder.glob(f"{name.split('_d')[0]}_masks.npz")))
-        self.counted = masks["hit"] & ~masks["disputed"]
-        self.hit = masks["hit"]
-        self.reference = np.load(folder / f"{name}.npy").reshape(self.hit.shape)
-        rows = csv.DictReader((folder / "index.csv").open())
-        errors = {r["id"]: float(r["reference_standard_error"]) for r in rows if r["kind"] == "image"}
-        self.noise = errors[name]
-        self.fine = None
-        self.rays(camera)
+    asked: float
+    seconds: float
+    estimate: float
+    met: bool
+    true: float
+    noise: float
+    mib: float
 
-    def rays(self, camera):
-        """Origins through the centres of the pixels that meet the object, and the common direction."""
-        eye, target, up = (np.array(camera[k], float) for k in ("eye", "target", "up"))
-        unit = lambda v: v / np.linalg.norm(v)
-        self.forward = unit(target - eye)
-        right = unit(np.cross(self.forward, up))
-        up = np.cross(right, self.forward)
-        columns, rows = camera["resolution"]
-        i, j = np.nonzero(self.hit)
-        x = ((j + 0.5) / columns - 0.5) * camera["height"] * columns / rows
-        y = (0.5 - (i + 0.5) / rows) * camera["height"]
-        self.origins = eye + x[:, None] * right + y[:, None] * up
+    @property
+    def shown(self):
+        """The true error, or the least that the truth shows."""
+        return max(self.true, self.noise)
+
+
+class Curve:
+    """The path tracer's processor seconds for an error, between and beyond those measured."""
+
+    def __init__(self, world, dearest):
+        self.points = []
+        for samples in SAMPLES:
+            (a, first), (b, second) = world.image(samples), world.image(samples)
+            # two independent images: their difference holds the errors of both and no truth is needed
+            error = np.sqrt(((a - b) ** 2).mean(0) / 2)
+            self.points.append((samples, float((error / world.reference).max()), min(first, second)))
+            self.mean = (a + b) / 2
+            if first > dearest:
+                break
+
+    def seconds(self, error):
+        """Seconds for an error: along the measured points, beyond them by its inverse square."""
+        points = [(math.log(e), math.log(max(s, 1e-6))) for _, e, s in self.points if e > 0]
+        if not points:
+            return 0.0
+        x = math.log(error)
+        if x >= points[0][0] or len(points) == 1:
+            at = points[0]
+        elif x <= points[-1][0]:
+            at = points[-1]
+        else:
+            pairs = zip(points, points[1:])
+            (x0, y0), (x1, y1) = next(p for p in pairs if p[0][0] >= x >= p[1][0])
+            return math.exp(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+        return math.exp(at[1] - 2.0 * (x - at[0]))
+
+
+class Entry:
+    """An image with both programs' measurements."""
+
+    def __init__(self, blik, path, options):
+        self.blik, self.path, self.options = blik, path, options
+        self.scene = scene.Scene(path)
+        self.truth = self.known_truth()
+        self.world = paths.World(self.scene)
+
+    def known_truth(self):
+        """The judge's image, from its file or computed and kept."""
+        goal, rays = TRUTH_QUICK if self.options.quick else TRUTH
+        folder = self.options.work / "truth"
+        folder.mkdir(exist_ok=True)
+        key = scene.digest(self.scene.files)
+        best = folder / f"{self.scene.name}_{key}.npy"
+        quick = folder / f"{self.scene.name}_{key}_quick.npy"
+        if self.options.quick and not best.exists():
+            best = quick
+        if not best.exists():
+            self.blik("open", self.path)
+            self.blik("truth", goal, rays, best)
+        return scene.Truth(self.scene, np.load(best))
 
     def eps(self, values):
-        """eps_c of an image given by its object pixels, or None where the references' noise hides it."""
-        image = np.zeros(self.hit.shape)
-        image[self.hit] = values
-        error = shown((image - self.reference)[self.counted], self.noise)
-        if error is None and self.fine:
-            pixels, reference, noise = self.fine
-            error = shown(np.asarray(values)[pixels] - reference, noise)
-        return error
+        """True error of the object's pixels, and its standard error."""
+        image = np.zeros((self.world.hit.size, self.scene.bands))
+        image[self.world.hit] = values
+        return self.truth.eps(image)
 
-    def refine(self, work):
-        """Makes a finer reference of some pixels, with Mitsuba, and keeps it in the work folder."""
-        file = work / f"{self.name}_fine.npz"
-        if not file.exists():
-            # spread over the object; numbers in the order of its pixels
-            counted = np.flatnonzero(self.counted[self.hit])
-            pixels = np.unique(counted[np.linspace(0, len(counted) - 1, FINE_PIXELS).astype(int)])
-            subset = copy.copy(self)
-            subset.origins = self.origins[pixels]
-            passes = list(Mitsuba(subset).passes(FINE_SAMPLES))
-            error2 = np.mean(np.var(passes, axis=0, ddof=1)) / len(passes)
-            np.savez(file, pixels=pixels, values=np.mean(passes, axis=0), noise=math.sqrt(error2))
-        kept = np.load(file)
-        self.fine = kept["pixels"], kept["values"], float(kept["noise"])
+    def runs(self):
+        """Blik's runs from coarse to fine."""
+        out, runs = self.options.work / "image.f32", []
+        self.blik("open", self.path)
+        longest = LONGEST_QUICK if self.options.quick else LONGEST
+        for tolerance in self.options.tolerances:
+            seconds = []
+            while len(seconds) < REPEATED and (not seconds or sum(seconds) + seconds[-1] < 1.0):
+                answer = self.blik("cold", tolerance, out, seconds=4 * longest)
+                if answer is None:
+                    return runs
+                seconds.append(answer["processor"])
+            pixels = np.fromfile(out, np.float32).reshape(-1, self.scene.bands).astype(float)
+            true, spread = self.truth.eps(pixels)
+            noise = self.truth.noise() if true < 2 * spread else 0.0
+            runs.append(Run(tolerance, min(seconds), answer["estimate"], answer["met"], true, noise, answer["bytes"] / 2**20))
+            if runs[-1].seconds > longest:
+                break
+        return runs
 
-
-def shown(differences, noise):
-    """Rms of differences without the reference's noise, or None where that hides it."""
-    corrected = math.sqrt(max(0.0, np.mean(differences**2) - noise**2))
-    return corrected if corrected >= 0.5 * noise else None
-
-
-def processor():
-    """Computing time of this process and of those that it has waited for."""
-    return sum(os.times()[:4])
-
-
-class Mitsuba:
-    """Path tracing of the object's pixels: the sky is met by the surfaces' own sampling."""
-
-    def __init__(self, scene):
-        import drjit as dr
-        import mitsuba as mi
-
-        if mi.variant() is None:
-            mi.set_variant("llvm_ad_mono")
-            dr.set_thread_count(2)
-        self.scene, self.dr, self.mi = scene, dr, mi
-        total = scene.diffuse + scene.specular
-        share = scene.specular / total
-        diffuse = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": total}}
-        mirror = {"type": "conductor", "material": "none", "specular_reflectance": {"type": "spectrum", "value": total}}
-        bsdf = {"type": "blendbsdf", "weight": share, "a": diffuse, "b": mirror} if share else diffuse
-        props = mi.Properties()
-        props["bsdf"] = mi.load_dict(bsdf)
-        mesh = mi.Mesh("mesh", len(scene.vertices), len(scene.facets), props=props)
-        params = mi.traverse(mesh)
-        # every facet with vertices of its own is flat: no normals are interpolated
-        params["vertex_positions"] = mi.Float(scene.vertices.ravel())
-        params["faces"] = mi.UInt32(scene.facets.ravel())
-        params.update()
-        self.world = mi.load_dict({"type": "scene", "mesh": mesh})
-        self.sampler = mi.load_dict({"type": "multijitter"})
-        self.origins = mi.Point3f(scene.origins.T)
-        self.seed = 0
-
-    def image(self, samples):
-        """Seconds, the object's pixels and processor seconds; the scene is in memory. Samples: a square number."""
-        start, before = time.perf_counter(), processor()
-        total, count = 0.0, 0
-        for values in self.passes(samples):
-            total, count = total + values, count + 1
-        return time.perf_counter() - start, total / count, processor() - before
-
-    def passes(self, samples):
-        """The pixels of one image after the other, which have so many samples together."""
-        # so many rays at once fit into the memory of a small machine
-        side = math.isqrt(min(samples, (1 << 23) // len(self.scene.origins)))
-        for _ in range(round(samples / side**2)):
-            self.seed += 1
-            yield np.array(self.paths(side**2, self.seed))
-
-    def paths(self, samples, seed):
-        dr, mi = self.dr, self.mi
-        count = len(self.scene.origins) * samples
-        sampler = self.sampler.clone()
-        sampler.set_sample_count(samples)
-        sampler.set_samples_per_wavefront(samples)
-        sampler.seed(seed, count)
-        origin = dr.gather(mi.Point3f, self.origins, dr.arange(mi.UInt32, count) // samples)
-        ray = mi.Ray3f(origin, mi.Vector3f(*map(float, self.scene.forward)))
-        return dr.block_sum(trace(dr, mi, self.world, sampler, ray), samples) / samples
+    def rows(self):
+        """One row for each tolerance."""
+        dearest = DEAREST_QUICK if self.options.quick else DEAREST
+        self.world.image(4)  # compiles
+        curve = Curve(self.world, dearest)
+        self.agreement = self.eps(curve.mean)[0] / max(curve.points[-1][1] / math.sqrt(2), 1e-30)
+        runs, able = {r.asked: r for r in self.runs()}, self.scene.computable()
+        for asked in self.options.tolerances:
+            run = runs.get(asked)
+            row = {"image": self.scene.name, "light": self.scene.light(), "facets": len(self.scene.facets), "asked": asked}
+            row["peer_s_asked"] = curve.seconds(asked) if able else None
+            if run:
+                row |= {"estimate": run.estimate, "true": run.true, "noise": run.noise, "s": run.seconds, "mib": run.mib}
+                row |= {"met": int(run.met), "peer_s_true": curve.seconds(run.shown) if able else None}
+                for key in ("asked", "true"):
+                    row[f"ratio_{key}"] = row[f"peer_s_{key}"] / run.seconds if able else None
+            yield row
 
 
-def _trace():
-    import drjit as dr
-
-    @dr.syntax
-    def trace(dr, mi, world, sampler, ray):
-        context = mi.BSDFContext()
-        radiance, weight = mi.Float(0), mi.Float(1)
-        active, depth = mi.Bool(True), mi.UInt32(0)
-        while active:
-            hit = world.ray_intersect(ray, active)
-            out = active & ~hit.is_valid()
-            radiance += dr.select(out, weight, 0)
-            active &= hit.is_valid()
-            sample, value = hit.bsdf(ray).sample(
-                context, hit, sampler.next_1d(active), sampler.next_2d(active), active
-            )
-            weight *= value[0]
-            ray = hit.spawn_ray(hit.to_world(sample.wo))
-            depth += 1
-            active &= weight > 0
-            # Russian roulette from the fifth reflection on, as the stock integrator does
-            survive = dr.minimum(weight, 0.95)
-            late = depth >= 5
-            active &= ~late | (sampler.next_1d(active) < survive)
-            weight = dr.select(late, weight / survive, weight)
-        return radiance
-
-    return trace
-
-
-def trace(*arguments):
-    """One path for each ray; compiled once."""
-    global _compiled
-    if _compiled is None:
-        _compiled = _trace()
-    return _compiled(*arguments)
-
-
-_compiled = None
-
-
-class Radiance:
-    """rtrace with its ambient cache, on the same rays."""
-
-    def __init__(self, scene, work):
-        import pyradiance
-
-        self.scene, self.work = scene, work
-        root = work / "venv" / "lib"
-        self.root = next(root.glob("python*/site-packages/pyradiance"))
-        assert pyradiance
-        d, s = scene.diffuse, scene.specular
-        head = f"void plastic m 0 0 5 {d} {d} {d} 0 0\n"
-        if s:
-            # the one material of it that is diffuse + mirror
-            head = f"void BRTDfunc m 10 {s} {s} {s} 0 0 0 0 0 0 . 0 9 {d} {d} {d} 0 0 0 0 0 0\n"
-        text = [head, "void glow g 0 0 4 1 1 1 0\ng source sky 0 0 4 0 0 1 360\n"]
-        for i, facet in enumerate(scene.facets):
-            corners = " ".join(f"{x:.9g}" for x in scene.vertices[facet].ravel())
-            text.append(f"m polygon f{i} 0 0 9 {corners}\n")
-        (work / "scene.rad").write_text("".join(text))
-        octree = subprocess.run([self.root / "bin/oconv", work / "scene.rad"], env=self.env(), capture_output=True, check=True)
-        (work / "scene.oct").write_bytes(octree.stdout)
-        forward = np.broadcast_to(scene.forward, scene.origins.shape)
-        (work / "scene.rays").write_bytes(np.hstack([scene.origins, forward]).astype(np.float64).tobytes())
-
-    def env(self):
-        return {"RAYPATH": f".:{self.root}/lib", "PATH": "/usr/bin:/bin"}
-
-    def image(self, divisions):
-        """Seconds and processor seconds of the program, with its octree made, and the object's pixels."""
-        settings = f"-h -fdf -ab 5 -ad {divisions} -as {divisions // 4} -aa .1 -ar 512 -lw 1e-6 -lr 8 -n 2".split()
-        start, before = time.perf_counter(), processor()
-        with (self.work / "scene.rays").open("rb") as rays:
-            command = [self.root / "bin/rtrace", *settings, self.work / "scene.oct"]
-            run = subprocess.run(command, stdin=rays, env=self.env(), capture_output=True, check=True)
-        seconds = time.perf_counter() - start, processor() - before
-        return *seconds, np.frombuffer(run.stdout, np.float32).reshape(-1, 3)[:, 0]
-
-
-def blik_runs(blik, scene, options):
-    """(tolerance, seconds, error, whether it is the true one, processor seconds) from coarse to fine; where the
-    reference does not show the error it is the estimate."""
-    out, runs = options.work / "image.f32", []
-    blik("open", scene.path)
-    for tolerance in TOLERANCES:
-        answer = blik("cold", tolerance, out)
-        pixels = np.fromfile(out, np.float32).reshape(scene.hit.shape)[scene.hit]
-        true = scene.eps(pixels)
-        error = true or answer["estimate"]
-        runs.append((tolerance, answer["seconds"], error, true is not None, answer["processor"]))
-        if answer["processor"] > LONGEST:
-            break
-    return runs
-
-
-def first(runs, goal):
-    """The quickest run that reaches the goal."""
-    return min((r for r in runs if r[2] <= goal), key=lambda r: r[4], default=None)
-
-
-def in_turn(blik, mitsuba, tolerance, samples, work, runs):
-    """Median (seconds, processor seconds) of both, a run of each in turn."""
-    own, theirs = [], []
-    mitsuba.image(samples)  # compiles
-    for _ in range(runs):
-        answer, (seconds, _, processor) = blik("cold", tolerance, work), mitsuba.image(samples)
-        own.append((answer["seconds"], answer["processor"]))
-        theirs.append((seconds, processor))
-    medians = lambda rows: [statistics.median(column) for column in zip(*rows)]
-    return medians(own), medians(theirs)
+COLUMNS = [
+    "image", "light", "facets", "asked", "estimate", "true", "noise", "met", "s", "mib", "peer_s_true", "peer_s_asked",
+    "ratio_true", "ratio_asked",
+]  # fmt: skip
 
 
 def compare(blik, found, options):
-    """Tables for both programs."""
-    head = "| image, 2 threads | error | Blik: tolerance | error | s | of the processor | {} | s | of the processor | ratio | ratio |"
-    tables = {"Mitsuba: samples": [], "Radiance: -ad": []}
-    for name in filter(found.get, SCENES):
-        scene = Scene(found[name], name)
-        if min(GOALS[name]) < 0.5 * scene.noise:
-            scene.refine(options.work)
-        runs = blik_runs(blik, scene, options)
-        tables["Mitsuba: samples"] += mitsuba_rows(blik, scene, Mitsuba(scene), runs, options)
-        tables["Radiance: -ad"] += radiance_rows(scene, runs, options, options.work)
-    note = (
-        "Ratios: of seconds, of processor seconds. Errors in brackets: below what the reference shows; Blik's is its own "
-        "estimate, Mitsuba's goes with samples^-1/2."
-    )
-    lines = []
-    for program, rows in tables.items():
-        lines += [head.format(program), "|" + "---|" * 11, *rows, ""]
-    return "\n".join([*lines, note]) + "\n"
+    """Measures all images; writes images.csv and images.svg beside the table."""
+    rows = []
+    for name in sorted(chosen(blik, found, options)):
+        entry = Entry(blik, found[name], options)
+        rows += entry.rows()
+        own = [f"{r['s']:.2f}" for r in rows if r["image"] == name and "s" in r]
+        print(f"{name}: {', '.join(own)} s; path tracer off the truth by {entry.agreement:.2f} of its own error", flush=True)
+    folder = options.folder
+    with (folder / "images.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        short = lambda v: f"{v:.3g}" if isinstance(v, float) else v
+        writer.writerows({k: short(v) for k, v in row.items()} for row in rows)
+    (folder / "images.svg").write_text(chart.draw(rows))
+    return table(rows) + "\n" + summary(rows)
 
 
-def row(name, goal, blik, own, peer, theirs):
-    """A line of a table; `blik` is a run or None, `own` and `theirs` are seconds and processor seconds."""
-    head = f"| {name} | {goal:.2e} |"
-    if blik is None:
-        return f"{head} not reached | | | | {peer} | {theirs[0]:.3f} | {theirs[1]:.3f} | | |"
-    error = f"{blik[2]:.1e}" if blik[3] else f"({blik[2]:.1e})"
-    ratios = [t / o for t, o in zip(theirs, own)]
-    return (
-        f"{head} {blik[0]:.0e} | {error} | {own[0]:.3f} | {own[1]:.3f} | {peer} | {theirs[0]:.3f} | {theirs[1]:.3f} | "
-        f"{ratios[0]:.1f} | {ratios[1]:.1f} |"
-    )
+def chosen(blik, found, options):
+    """Names of the images; generated ones are drawn into the work folder."""
+    names = set(FEW if options.quick else found) & set(found)
+    folder = options.work / "scenes"
+    for kind in blik("kinds")[:: EVERY if options.quick else 1]:
+        name = blik("draw", kind, options.seed, folder)["name"]
+        found[name] = folder / f"{name}.toml"
+        names.add(name)
+    return [n for n in names if not options.images or any(n.startswith(i) for i in options.images)]
 
 
-def mitsuba_rows(blik, scene, mitsuba, runs, options):
-    mitsuba.image(64)
-    # the error of one sample a pixel, from the mean of several images' squares
-    errors = [scene.eps(mitsuba.image(64)[1]) for _ in range(3)]
-    single = math.sqrt(statistics.mean((e or 0.0) ** 2 for e in errors) * 64)
-    lines = []
-    for goal in GOALS[scene.name]:
-        samples = math.ceil(max(2.0, single / goal)) ** 2
-        run = first(runs, goal)
-        # more samples than that are so many images of this many
-        few, count = min(samples, 1024), 3 if options.quick else 5
-        own, theirs = in_turn(blik, mitsuba, (run or runs[0])[0], few, options.work / "image.f32", count)
-        lines.append(row(scene.name, goal, run, own, samples, [t * samples / few for t in theirs]))
-    return lines
+def number(value, form):
+    return "" if value is None else format(value, form)
 
 
-def radiance_rows(scene, runs, options, work):
-    program = Radiance(scene, work)
-    lines = []
-    for divisions in [128] if options.quick else [128, 512]:
-        seconds, processor, values = program.image(divisions)
-        error = scene.eps(values) or 0.5 * scene.noise
-        run = first(runs, error)
-        lines.append(row(scene.name, error, run, run and (run[1], run[4]), divisions, (seconds, processor)))
-    return lines
+def table(rows):
+    """All rows in Markdown, the worst image at the error asked for first."""
+    worst = lambda name: min((r["ratio_asked"] for r in rows if r["image"] == name and r.get("ratio_asked")), default=math.inf)
+    head = "image | light | facets | asked | estimate | true | Blik s | MiB | peer s, true | peer s, asked | equal | asked"
+    lines = [f"| {head} |", "|" + "---|" * 12]
+    for row in sorted(rows, key=lambda r: (worst(r["image"]), r["image"], -r["asked"])):
+        first = row["asked"] == max(r["asked"] for r in rows if r["image"] == row["image"])
+        lines.append("| " + " | ".join(cells(row, first)) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def cells(row, first):
+    head = [row["image"], row["light"], str(row["facets"])] if first else ["", "", ""]
+    if "s" not in row:
+        return [*head, f"{row['asked']:.0e}", "not run", "", "", "", "", number(row["peer_s_asked"], ".2f"), "", ""]
+    true = f"{row['true']:.1e}" if not row["noise"] else f"< {row['noise']:.1e}"
+    ratios = [number(row[k], ".2g") for k in ("ratio_true", "ratio_asked")]
+    ratios = [f"**{r}**" if r and float(r) < 1 else r for r in ratios]
+    estimate = f"{row['estimate']:.1e}" + ("" if row["met"] else " (not met)")
+    seconds = [number(row[k], ".3g") for k in ("s", "mib", "peer_s_true", "peer_s_asked")]
+    return [*head, f"{row['asked']:.0e}", estimate, true, *seconds, *ratios]
+
+
+def summary(rows):
+    """Per tolerance: where Blik is ahead, medians, and how well its estimates tell the truth."""
+    head = "asked | images | ahead at equal error | ahead at the error asked for | worst, median ratio at equal error | the same at the error asked for | true <= estimate | estimate <= 2 x true | true in 0.4 to 1 of asked | above asked | not run"
+    lines = [f"| {head} |", "|" + "---|" * 11]
+    for asked in sorted({r["asked"] for r in rows}, reverse=True):
+        here = [r for r in rows if r["asked"] == asked]
+        ran = [r for r in here if "s" in r]
+        cells = [f"{asked:.0e}", str(len(ran))]
+        for key in ("ratio_true", "ratio_asked"):
+            values = [r[key] for r in ran if r[key] is not None]
+            cells.append(f"{sum(v > 1 for v in values)} of {len(values)}")
+        for key in ("ratio_true", "ratio_asked"):
+            values = [r[key] for r in ran if r[key] is not None]
+            cells.append(f"{min(values):.2g}, {statistics.median(values):.2g}" if values else "")
+        seen = [r for r in ran if not r["noise"]]
+        share = lambda some, of: f"{sum(map(of, some))} of {len(some)}"
+        cells += [
+            share(ran, lambda r: r["true"] <= r["estimate"]),
+            share(seen, lambda r: r["estimate"] <= 2 * r["true"]),
+            share(ran, lambda r: 0.4 * asked <= r["true"] <= asked),
+            share(ran, lambda r: r["true"] > asked),
+            str(len(here) - len(ran)),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"

@@ -1,6 +1,11 @@
 //! Blik's side of the comparison with other programs: does what it is told on standard input, line by line, and answers
 //! each line with one line of JSON. `benches/peers/run` starts it; see the page beside this file.
 
+#[path = "../../tests/support/drawn/mod.rs"]
+mod drawn;
+mod generated;
+#[path = "../../tests/support/judge/mod.rs"]
+mod judge;
 #[path = "../../tests/support/kernel.rs"]
 mod kernel;
 #[path = "../time_error/processor.rs"]
@@ -44,12 +49,24 @@ fn main() -> Result<(), Box<dyn Error>> {
                 again(&host, scene, tolerance.parse()?, runs.parse()?)
             }
             (["rays", kind, folder], Some(scene)) => rays::measure(scene, kind, Path::new(folder)),
+            (["kinds"], _) => Ok(json!(generated::KINDS.map(|(name, _)| name))),
+            (["draw", kind, seed, folder], _) => draw(kind, seed.parse()?, Path::new(folder)),
+            (["truth", goal, rays, out], Some(scene)) => {
+                generated::truth(&scene.scene, &scene.camera, goal.parse()?, rays.parse()?, Path::new(out))
+            }
             (["factors", quads, runs], _) => factors(quads.parse()?, runs.parse()?),
             _ => Err(format!("not understood: {line}").into()),
         };
         println!("{}", answer.unwrap_or_else(|error| json!({ "error": error.to_string() })));
     }
     Ok(())
+}
+
+/// Writes a generated scene of a kind; its name.
+fn draw(kind: &str, seed: usize, folder: &Path) -> Answer {
+    let name = format!("{kind}_{seed}");
+    generated::write(&generated::Generated::named(kind, seed).ok_or("no such kind")?, folder, &name)?;
+    Ok(json!({ "name": name }))
 }
 
 /// A scene file, read.
@@ -59,17 +76,23 @@ struct Loaded {
     camera: CameraInput,
     soup: kernel::Soup,
     table: Vec<f32>,
+    reference: Option<Vec<f64>>,
 }
 
 impl Loaded {
     fn new(path: &Path) -> Loaded {
-        let (scene, view) = scene_file::read(path);
+        let (scene, view, extra) = scene_file::read_all(path);
         let table = scene.sky.as_ref().map_or(Vec::new(), kernel::table);
-        Loaded { soup: kernel::Soup::new(&scene), camera: kernel::camera(&view), view, scene, table }
+        let soup = kernel::Soup::indexed(&extra.mesh, &extra.materials, scene.two_sided);
+        let (camera, reference) = (kernel::camera(&view), extra.reference_radiance);
+        Loaded { soup, camera, view, scene, table, reference }
     }
 
-    fn uniform(&self) -> bool {
-        matches!(self.scene.sky.as_ref().map(|s| &s.model), Some(twin::Model::Uniform))
+    fn settings(&self, tolerance: f64) -> Settings {
+        // of a uniform sky and of none no directions are asked for
+        let uniform = |sky: &twin::Sky| matches!(sky.model, twin::Model::Uniform);
+        let directional = self.scene.sky.as_ref().is_some_and(|sky| !uniform(sky));
+        Settings { tolerance, directional, reference_radiance: self.reference.clone(), ..Settings::default() }
     }
 
     fn geometry<'m>(
@@ -86,10 +109,6 @@ impl Loaded {
         let sun = self.scene.sun.as_ref().map(kernel::sun_input);
         Ok(host.light(geometry, sky.as_ref(), sun.as_ref())?)
     }
-}
-
-fn settings(tolerance: f64, directional: bool) -> Settings {
-    Settings { tolerance, directional, reference_radiance: Some(vec![1.0]), ..Settings::default() }
 }
 
 /// Seconds of `work` and what it gives.
@@ -117,7 +136,7 @@ fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
     let (seconds, image) = timed(|| -> Result<Image, Box<dyn Error>> {
         let (mut memory, mut rounds) = (GeometryMemory::default(), Rounds::new(tolerance));
         loop {
-            let settings = rounds.settings(settings(tolerance, !scene.uniform()));
+            let settings = rounds.settings(scene.settings(tolerance));
             let geometry = scene.geometry(host, &settings, &mut memory)?;
             let lit = scene.light(host, &geometry)?;
             let mut image = host.image(&lit, &scene.camera, false)?;
@@ -131,7 +150,8 @@ fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
     std::fs::write(out, bytes)?;
     let (report, b) = (&image.report, image.report.bytes);
     Ok(json!({
-        "seconds": seconds, "processor": processor, "estimate": report.error_estimate,
+        "seconds": seconds, "processor": processor,
+        "estimate": report.error_estimate, "met": report.tolerance_met,
         "bytes": b.scene + b.bvh + b.coupling + b.light + b.image,
     }))
 }
@@ -139,7 +159,7 @@ fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
 /// What a solved scene costs again: an image from elsewhere, larger ones, new light, a light curve.
 fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     let (mut memory, mut directed) = (GeometryMemory::default(), GeometryMemory::default());
-    let plain = scene.geometry(host, &settings(tolerance, !scene.uniform()), &mut memory)?;
+    let plain = scene.geometry(host, &scene.settings(tolerance), &mut memory)?;
     let lit = scene.light(host, &plain)?;
     let [e, t] = [scene.camera.eye, scene.camera.target].map(Vec3::from);
     let across = (t - e).cross(scene.camera.up.into()).normalize() * 0.1 * (t - e).length();
@@ -153,7 +173,7 @@ fn again(host: &Host, scene: &Loaded, tolerance: f64, runs: usize) -> Answer {
     };
     let directions: Vec<Vec3> = (0..1000).map(direction).collect();
     let curve = || host.signatures(&lit, &directions).map(drop).map_err(Into::into);
-    let all = Settings { all_irradiances: true, ..settings(tolerance, true) };
+    let all = Settings { all_irradiances: true, directional: true, ..scene.settings(tolerance) };
     let geometry = scene.geometry(host, &all, &mut directed)?;
     let sky = |model| SkyInput { model, radiance: &[1.0], ground: &[0.1], up: [0.0, 0.0, 1.0] };
     let sun = SunInput { direction: [0.5, 0.8, 0.9], irradiance: &[2.0], half_angle_deg: 0.2665 };

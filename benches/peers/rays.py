@@ -17,7 +17,7 @@ def compare(blik, found, options):
     folder = options.work / "rays"
     folder.mkdir(exist_ok=True)
     for scene in filter(found.get, SCENES[:2] if options.quick else SCENES):
-        blik("open", found[scene] / f"{scene}.toml")
+        blik("open", found[scene])
         for kind in ["primary", "hemisphere"]:
             own, theirs = [], []
             for _ in range(1 if options.quick else 3):

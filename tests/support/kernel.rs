@@ -5,6 +5,7 @@
 #![allow(dead_code)]
 
 use crate::support::scene_file::Camera;
+use crate::support::scenes::Mesh;
 use crate::support::twin;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
 use blik_kernel::chain::{Sample, Terms};
@@ -49,6 +50,18 @@ impl Soup {
             facet_materials,
             materials,
             two_sided: scene.two_sided,
+            normals: Vec::new(),
+        }
+    }
+
+    /// A mesh whose facets share their vertices.
+    pub fn indexed(mesh: &Mesh, materials: &[twin::Material], two_sided: bool) -> Soup {
+        Soup {
+            vertices: mesh.vertices.clone(),
+            facets: mesh.facets.clone(),
+            facet_materials: mesh.materials.clone(),
+            materials: materials.to_vec(),
+            two_sided,
             normals: Vec::new(),
         }
     }

@@ -2,7 +2,7 @@
 //! normals alone.
 
 use super::npy;
-use super::scenes::read_obj;
+use super::scenes::{Mesh, read_obj};
 use super::twin::{Material, Model, Scene, Sky, Sun};
 use glam::DVec3;
 use std::path::Path;
@@ -35,8 +35,24 @@ impl Camera {
     }
 }
 
+/// What a file holds beside the scene: the mesh as it shares its vertices, and what errors are relative to.
+pub struct Extra {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Material of each index that the mesh names.
+    pub materials: Vec<Material>,
+    /// Reference radiance per band, where the file gives it.
+    pub reference_radiance: Option<Vec<f64>>,
+}
+
 /// Reads scene and camera; panics with the path when it cannot.
 pub fn read(path: &Path) -> (Scene, Camera) {
+    let (scene, camera, _) = read_all(path);
+    (scene, camera)
+}
+
+/// The same with the rest.
+pub fn read_all(path: &Path) -> (Scene, Camera, Extra) {
     let what = path.display().to_string();
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{what}: {e}"));
     let file: Table = text.parse().unwrap_or_else(|e| panic!("{what}: {e}"));
@@ -55,7 +71,9 @@ pub fn read(path: &Path) -> (Scene, Camera) {
         let irradiance = per_band(entries, "irradiance", 0.0, bands);
         scene = scene.sun(Sun { direction: vector(entries, "direction", None), irradiance, half_angle });
     }
-    (scene, camera(table(&file, "camera").expect("[camera]")))
+    let reference = |_| per_band(&file, "reference_radiance", 1.0, bands);
+    let reference_radiance = file.get("reference_radiance").map(reference);
+    (scene, camera(table(&file, "camera").expect("[camera]")), Extra { mesh, materials, reference_radiance })
 }
 
 fn material(file: &Table, name: &str, bands: usize) -> Material {

@@ -1,9 +1,9 @@
 //! The calibration's cases: case i is the same in every run.
 
-use super::draw::Draw;
 use super::families::FAMILIES;
-use super::light::lights;
 use super::setting::{Eye, Setting};
+use crate::drawn::Draw;
+use crate::drawn::light::lights;
 use crate::support::scenes::Mesh;
 use crate::support::twin::{Material, Scene, Sky, Sun};
 use blik_kernel::camera::{CameraInput, Projection, Sampling};

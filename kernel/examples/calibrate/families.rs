@@ -1,9 +1,11 @@
 //! The kinds of scenes: bodies and materials of each, drawn.
 
-use super::draw::Draw;
-use super::light::{Suns, diffuse, glossy, material, mirror};
 use super::setting::{Eye, Setting};
-use super::shapes::{craft, cuboid, cylinder, dish, floor, revolved, room, room_with_hole, sheet, terrain};
+use crate::drawn::Draw;
+use crate::drawn::light::{Suns, diffuse, glossy, material, mirror, tinted};
+use crate::drawn::shapes::{
+    craft, cuboid, cylinder, dish, floor, revolved, room, room_with_hole, sheet, terrain,
+};
 use crate::support::scenes::{Mesh, box_open, corner, sphere};
 use glam::{DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
@@ -111,7 +113,7 @@ fn lamp_room(draw: &mut Draw, bands: usize) -> Setting {
     }
     let share = if draw.chance(0.6) { 0.0 } else { draw.real(0.1, 0.5) };
     let mut emitter = diffuse(draw, bands);
-    emitter.emission = super::light::tinted(draw, bands, 0.5, 3.0);
+    emitter.emission = tinted(draw, bands, 0.5, 3.0);
     let materials = vec![material(draw, bands, 0.2, 0.75, share), emitter, diffuse(draw, bands)];
     let inside = Eye::Within(size * dvec3(1.0, 1.0, 0.7));
     let setting = Setting::new(mesh, materials).eye(inside);
@@ -336,7 +338,7 @@ fn mixed(draw: &mut Draw, bands: usize) -> Setting {
             _ => diffuse(draw, bands),
         };
         if draw.chance(0.25) {
-            chosen.emission = super::light::tinted(draw, bands, 0.1, 1.0);
+            chosen.emission = tinted(draw, bands, 0.1, 1.0);
         }
         materials.push(chosen);
     }

@@ -18,6 +18,8 @@
 //! * `--pixels N`: the error that sampling the pixels' area brings alone, against the mean of N rays through each
 //! * `--list`: names the cases and ends
 
+#[path = "../../../tests/support/drawn/mod.rs"]
+mod drawn;
 #[path = "../../../tests/support/judge/mod.rs"]
 mod judge;
 #[path = "../../../tests/support/kernel.rs"]
@@ -28,15 +30,12 @@ mod support;
 mod blik;
 mod case;
 mod causes;
-mod draw;
 mod families;
 mod figures;
-mod light;
 mod options;
 mod pixels;
 mod reference;
 mod setting;
-mod shapes;
 mod verify;
 
 use case::{CASES, Case};

@@ -1,6 +1,6 @@
 //! A kind's scene before its light and camera are drawn.
 
-use super::light::Suns;
+use crate::drawn::light::Suns;
 use crate::support::scenes::Mesh;
 use crate::support::twin::Material;
 use glam::DVec3;

@@ -18,6 +18,7 @@ mod sunlight;
 mod view;
 mod walk;
 
+pub use sampler::mix;
 pub use score::{Score, score};
 pub use view::{Halves, ray};
 
@@ -27,7 +28,7 @@ use blik_kernel::bvh::Bvh;
 use blik_kernel::ray::Ray;
 use blik_kernel::simd::Isa;
 use glam::DVec3;
-use sampler::{Sampler, mix};
+use sampler::Sampler;
 use std::f64::consts::FRAC_1_PI;
 use sunlight::Mirrors;
 use walk::Path;

@@ -89,15 +89,33 @@ struct Pixel {
 }
 
 impl Judge<'_> {
+    /// Whether the ray through each pixel's centre meets the object.
+    pub fn hits(&self, camera: &CameraInput) -> Vec<bool> {
+        let (lens, columns) = (Lens::new(camera), camera.columns);
+        let centre = |p: usize| lens.ray((p % columns) as f64 + 0.5, (p / columns) as f64 + 0.5);
+        (0..columns * camera.rows).map(|p| self.bvh.closest(&centre(p)).is_some()).collect()
+    }
+
     /// The image of a camera, with samples doubled until the standard error of eps_c against a perfect image falls
     /// below `goal` (relative to the reference radiance), or the next doubling would take more than `most_rays`.
     pub fn image(&self, camera: &CameraInput, goal: f64, most_rays: u64, seed: u32) -> Halves {
+        self.image_of(camera, |_| true, goal, most_rays, seed)
+    }
+
+    /// The same of the pixels that `taken` picks alone: the others count as if they met nothing.
+    pub fn image_of(
+        &self,
+        camera: &CameraInput,
+        taken: impl Fn(usize) -> bool,
+        goal: f64,
+        most_rays: u64,
+        seed: u32,
+    ) -> Halves {
         let lens = Lens::new(camera);
         let (columns, bands) = (camera.columns, self.bands);
         let reference = self.reference();
         let mut pixels = vec![Pixel::default(); columns * camera.rows];
-        let centre = |p: usize| lens.ray((p % columns) as f64 + 0.5, (p / columns) as f64 + 0.5);
-        let hit: Vec<bool> = (0..pixels.len()).map(|p| self.bvh.closest(&centre(p)).is_some()).collect();
+        let hit: Vec<bool> = self.hits(camera).into_iter().enumerate().map(|(p, h)| h && taken(p)).collect();
         let counted = hit.iter().filter(|&&h| h).count().max(1) as f64;
         let (mut done, mut samples) = (0, SAMPLES.0);
         loop {

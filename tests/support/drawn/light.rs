@@ -1,6 +1,6 @@
 //! Skies, suns and materials drawn for a case.
 
-use super::draw::Draw;
+use super::Draw;
 use crate::support::twin::{Material, Model, Sky, Sun};
 use glam::{DVec3, dvec3};
 

@@ -1,6 +1,6 @@
 //! The bodies of which the calibration's scenes are made. All stand about the origin; the material is 0.
 
-use super::draw::Draw;
+use super::Draw;
 use crate::support::scenes::{Mesh, cube_inside, cube_outside};
 use glam::{DVec3, dvec3};
 use std::f64::consts::TAU;
