@@ -1,7 +1,8 @@
 //! From mesh to image within half a second: the built-in aircraft, 512 x 512 pixels, in memory, both finishes.
 //!
 //! The bar is the time that the paper states for its diffuse-mirror variants at eps <= 2e-3, 0.5 s; what runs here
-//! is what the `render` program runs, files left out. `cargo bench --bench sub_second`
+//! is what the `render` program runs, files left out. `cargo bench --bench sub_second` fails where a finish's quickest run
+//! takes longer: what else the machine does can only add to a run.
 
 #![allow(dead_code)] // of the program's modules it takes the scene and the pipeline
 
@@ -37,6 +38,7 @@ mod view;
 use pipeline::{Job, Rendered};
 use scene_file::Scene;
 use std::path::Path;
+use std::process::ExitCode;
 use std::time::Instant;
 
 /// Seconds that the paper states.
@@ -45,14 +47,23 @@ const BAR: f64 = 0.5;
 /// Runs of each finish, of which the median counts.
 const RUNS: usize = 5;
 
-fn main() {
+fn main() -> ExitCode {
+    let mut within = true;
     let mesh = built_in::mesh();
     for (name, scene) in built_in::finishes() {
         let mut runs: Vec<(f64, Rendered)> = (0..RUNS).map(|_| run(name, &scene, &mesh)).collect();
         runs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        within &= runs[0].0 <= BAR && runs[0].1.report.tolerance_met;
         let (seconds, rendered) = &runs[RUNS / 2];
         print(name, *seconds, rendered);
     }
+    if within {
+        return ExitCode::SUCCESS;
+    }
+    println!(
+        "the bar is {BAR} s at the tolerance asked for: no run of a finish was within it, or its estimate was not"
+    );
+    ExitCode::FAILURE
 }
 
 fn run(name: &str, scene: &Scene, mesh: &mesh_file::Mesh) -> (f64, Rendered) {
