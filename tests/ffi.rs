@@ -60,14 +60,16 @@ fn mesh(input: &SceneInput<'_>) -> Arrays {
             gloss_rays: m.gloss.and_then(|g| g.rays).unwrap_or(0),
         })
         .collect();
-    let mut mesh = blik_mesh::default();
-    mesh.vertices = array(input.vertices, BLIK_F64);
-    mesh.facets = array(input.facets, BLIK_U32);
-    mesh.facet_materials = array(input.facet_materials, BLIK_U32);
-    mesh.materials = materials.as_ptr();
-    mesh.material_count = materials.len();
-    mesh.bands = input.bands;
-    mesh.two_sided = i32::from(input.two_sided);
+    let mesh = blik_mesh {
+        vertices: array(input.vertices, BLIK_F64),
+        facets: array(input.facets, BLIK_U32),
+        facet_materials: array(input.facet_materials, BLIK_U32),
+        materials: materials.as_ptr(),
+        material_count: materials.len(),
+        bands: input.bands,
+        two_sided: i32::from(input.two_sided),
+        ..blik_mesh::default()
+    };
     Arrays { mesh, _materials: materials }
 }
 
@@ -85,8 +87,7 @@ fn camera(input: &CameraInput) -> blik_camera {
 }
 
 fn sky(input: &SkyInput<'_>) -> blik_sky {
-    let mut sky = blik_sky::default();
-    sky.model = BLIK_SKY_OVERCAST;
+    let mut sky = blik_sky { model: BLIK_SKY_OVERCAST, ..blik_sky::default() };
     (sky.radiance, sky.ground, sky.up) = (input.radiance.as_ptr(), input.ground.as_ptr(), input.up);
     sky
 }

@@ -59,7 +59,7 @@ fn wall_over_mirrors(rng: &mut Rng, number: usize) -> (Scene, CameraInput) {
     }
     let ratio = [3.0, 12.0, 40.0, 150.0][number % 4];
     let half = [0.0f64, 0.2665, 1.0, 3.0][(number / 2) % 4].to_radians();
-    let diffuse = if number % 2 == 0 { 0.0 } else { 0.2 };
+    let diffuse = if number.is_multiple_of(2) { 0.0 } else { 0.2 };
     let sun = dvec3(0.6 + rng.unit(), 0.3 + 0.5 * rng.unit(), 0.5 + rng.unit()).normalize();
     let materials = [glossy(diffuse, 0.5, ratio), Material::new(0.0, 0.4 + 0.5 * rng.unit())];
     let mut scene = Scene::new(&mesh, &materials).sun(Sun::new(sun, 2.0, half));

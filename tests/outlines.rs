@@ -76,7 +76,7 @@ fn compare(
         let mut candidates = Candidates::new(&mut arena, 1).unwrap();
         let total: f64 = scene.areas().iter().sum();
         for number in 0..points {
-            let sequence = Sequence::new(0x0071_1e5);
+            let sequence = Sequence::new(0x0007_11e5);
             let (mut at, side) = (sequence.pair(number, 0).0 * total, sequence.pair(number, 4).0);
             let facet = scene.areas().iter().position(|a| {
                 at -= a;

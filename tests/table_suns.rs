@@ -60,7 +60,7 @@ fn a_bright_spot_is_a_sun() {
             parts.iter().map(|(d, own, _)| own * (*d - direction).length_squared()).sum::<f64>() / energy;
         let width = step.1 * parts[0].2.cos();
         let half = (2.0 * (square + (step.0 * step.0 + width * width) / 6.0)).sqrt();
-        let reference = vec![(energy + PI) / PI];
+        let reference = [(energy + PI) / PI];
         let settings = within(2e-3);
         let seen = |scene: &Scene| {
             solve(scene, &settings, |_, lit| {

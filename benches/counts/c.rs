@@ -39,13 +39,19 @@ pub fn run(case: &Case, pixels: usize, step: fn()) {
         };
         let materials: Vec<blik_material> = input.materials.iter().map(material).collect();
         let array = |data, count, format| blik_array { data, count, stride: 0, format };
-        let mut mesh: blik_mesh = blik_mesh::default();
-        mesh.vertices = array(input.vertices.as_ptr().cast(), input.vertices.len(), BLIK_F64);
-        mesh.facets = array(input.facets.as_ptr().cast(), input.facets.len(), BLIK_U32);
-        mesh.facet_materials =
-            array(input.facet_materials.as_ptr().cast(), input.facet_materials.len(), BLIK_U32);
-        (mesh.materials, mesh.material_count, mesh.bands) =
-            (materials.as_ptr(), materials.len(), input.bands);
+        let mesh = blik_mesh {
+            vertices: array(input.vertices.as_ptr().cast(), input.vertices.len(), BLIK_F64),
+            facets: array(input.facets.as_ptr().cast(), input.facets.len(), BLIK_U32),
+            facet_materials: array(
+                input.facet_materials.as_ptr().cast(),
+                input.facet_materials.len(),
+                BLIK_U32,
+            ),
+            materials: materials.as_ptr(),
+            material_count: materials.len(),
+            bands: input.bands,
+            ..blik_mesh::default()
+        };
         // SAFETY: all arrays outlive the calls, and memory is as large as asked.
         memory.scene = size(|bytes| unsafe { blik_scene_size(&mesh, null_mut(), bytes) });
         let settings = blik_settings { tolerance: case.settings.tolerance, ..blik_settings::default() };

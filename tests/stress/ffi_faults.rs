@@ -114,8 +114,7 @@ fn until_made<T>(
 fn pixels_in_spite_of(fault: fn(u32) -> Fault, scene_too: bool) -> Vec<u32> {
     let inputs = Inputs { gloss: [0.0, 9.0], ..Inputs::new() };
     let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
-    let mut settings = blik_settings::default();
-    settings.tolerance = inputs.tolerance;
+    let settings = blik_settings { tolerance: inputs.tolerance, ..blik_settings::default() };
     with_mesh(&inputs, |mesh| {
         // SAFETY: valid structs and handles throughout.
         let create =
