@@ -96,6 +96,10 @@ impl Settings {
 /// The most bytes of a lane's beams: a facet's rays, all of which meet other elements, need less by far.
 const MOST_BEAM_BYTES: usize = 1 << 34;
 
+/// One piece in so many of an image's rows is looked at first, and the fewest pixels of the object that tell of the others.
+const LOOKS: usize = 6;
+const LOOKED: u64 = 64;
+
 /// Threads on which all stages run.
 #[derive(Debug)]
 pub struct Host {
@@ -354,7 +358,7 @@ impl Host {
         let mut pixels = std::vec![0f32; size];
         let part = if components { size } else { 0 };
         let mut terms = [(); 3].map(|()| std::vec![0f32; part]);
-        let tally = self.paint(&solved, &camera, &mut pixels, &mut terms)?;
+        let tally = self.paint(&solved, &camera, 1, &mut pixels, &mut terms)?;
         let mut report = lit.report.clone();
         report.bytes.image = 4 * (size + 3 * part);
         let (signature, rays) = self.signature(lit, camera.forward())?;
@@ -366,11 +370,31 @@ impl Host {
         Ok(Image { columns, rows, bands, pixels, components: components.then_some(terms), report })
     }
 
-    /// Computes all rows of an image in parallel pieces.
+    /// The report of a part of an image, to tell what the image's would be; `None` where the image is small.
+    pub fn look(&self, lit: &Lit<'_>, camera: &CameraInput) -> Result<Option<Report>, Error> {
+        let camera = Camera::new(camera, &lit.geometry.scene)?;
+        let (columns, rows, bands) = (camera.columns(), camera.rows(), lit.shape.bands);
+        if rows < LOOKS * image::piece(rows) {
+            return Ok(None);
+        }
+        let mut clock = Clock::start();
+        let mut pixels = std::vec![0f32; rows * columns * bands];
+        let tally = self.paint(&lit.solved(), &camera, LOOKS, &mut pixels, &mut [const { Vec::new() }; 3])?;
+        let mut report = lit.report.clone();
+        report.rays.primary = tally.primary;
+        report.rays.chain += tally.chain;
+        report.seconds.image = clock.lap();
+        report.finish(&tally, columns * rows, &lit.geometry.settings.budget);
+        // a few pixels of the object tell nothing
+        Ok((tally.object_pixels >= LOOKED).then_some(report))
+    }
+
+    /// Computes every `step`th piece of an image's rows, in parallel.
     fn paint(
         &self,
         solved: &Solved<'_>,
         camera: &Camera,
+        step: usize,
         pixels: &mut [f32],
         terms: &mut [Vec<f32>; 3],
     ) -> Result<Tally, Error> {
@@ -382,7 +406,9 @@ impl Host {
         let mut jobs = Vec::new();
         for (i, image) in pixels.chunks_mut(chunk).enumerate() {
             let components = parts.each_mut().map(|p| p.next().unwrap_or_default());
-            jobs.push((i * piece..((i + 1) * piece).min(rows), Target { image, components }));
+            if i % step == step / 2 {
+                jobs.push((i * piece..((i + 1) * piece).min(rows), Target { image, components }));
+            }
         }
         let (run, finished, parts) = (Run::new(self), AtomicUsize::new(0), jobs.len());
         let tallies = self.pool.install(|| {

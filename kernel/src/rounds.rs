@@ -4,16 +4,10 @@ use crate::base::math::sqrt;
 use crate::settings::check_tolerance;
 use crate::view::chain::GATHERS;
 
-/// Estimates up to so many tolerances are let pass: on the calibration's scenes they are about twice the error.
-const PASSES: f64 = 1.75;
-
-/// The same while the solution is coarser than asked: what is not mended by rays from points may be that wrong.
-const PASSES_COARSE: f64 = 1.35;
-
-/// The most rounds of one image, and the most and the least by which the tolerance falls from one to the next: half of it
+/// The most rounds of one image, and the least and the most that is left of the tolerance from one to the next: half of it
 /// takes some four times as long.
 const ROUNDS: u32 = 3;
-const STEPS: (f64, f64) = (0.4, 0.7);
+const STEPS: (f64, f64) = (0.3, 0.7);
 
 /// A round that leaves so much of the last one's estimate: more rounds would, too, once they are as fine as asked.
 const IDLE: f64 = 0.8;
@@ -22,12 +16,19 @@ const IDLE: f64 = 0.8;
 const MOST_RAYS: f64 = 2e8;
 const MOST_BYTES: f64 = (2u64 << 30) as f64;
 
-/// Solutions of images of less tolerance begin with this, and go on from it if rays from points cannot do the rest.
-const COARSE: f64 = 2e-3;
+/// Tolerance of an image's first solution over that of the image: rays from the image's points find the rest, and light that
+/// is reflected once more counts with the reflectance, from many elements whose errors differ.
+const COARSE: f64 = 3.0;
+
+/// The most of it: coarser elements tell nothing.
+const COARSEST: f64 = 0.02;
+
+/// Estimates of a part of an image are worse than of all by less than this factor.
+const PART: f64 = 1.15;
 
 /// The tolerance of the solution of an image's first round.
 pub fn first(asked: f64) -> f64 {
-    if GATHERS { asked.max(COARSE.min(20.0 * asked)) } else { asked }
+    if GATHERS { asked.max(COARSEST.min(COARSE * asked)) } else { asked }
 }
 
 /// One round of an image.
@@ -50,8 +51,7 @@ pub struct Round {
 pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let coarse = last.tolerance > asked;
     let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
-    let passes = if coarse { PASSES_COARSE } else { PASSES };
-    let done = last.estimate <= passes * asked || rounds >= ROUNDS || !last.by_visibility || idle;
+    let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
     let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
     // closed forms are as cheap as that
@@ -59,4 +59,9 @@ pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> O
     let step = wanted.min(STEPS.1).max(least);
     let next = step * last.tolerance;
     (!done && step <= STEPS.1 && check_tolerance(next).is_ok()).then_some(next)
+}
+
+/// As [`again`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.
+pub fn at_once(asked: f64, look: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
+    (look.estimate > PART * asked).then(|| again(asked, look, before, rounds)).flatten()
 }

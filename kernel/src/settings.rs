@@ -63,11 +63,12 @@ impl Settings {
     pub fn chains(&self, rays: u64) -> ChainSettings {
         let ErrorBudget { solution, image, gathering, .. } = self.budget;
         let growth = (solution / image) * (solution / image);
+        let finer = if solution > image { COARSE_GROWTH } else { ROUND_GROWTH };
         ChainSettings {
             budget: self.budget,
             max_bounces: self.max_bounces,
             gather: gathering,
-            rays: (rays as f64 * ROUND_GROWTH * growth) as u64,
+            rays: (rays as f64 * finer * growth) as u64,
             pixel: (f64::INFINITY, 0.0),
             apart: false,
         }
@@ -77,6 +78,10 @@ impl Settings {
 /// Rays of a round whose tolerance is half of the last one's, over those of the last: twice as many rows of nearly three
 /// times the rays, less what needs none. Times the square of how much finer the image is than the solution.
 const ROUND_GROWTH: f64 = 4.0;
+
+/// The same where the solution is coarser than the image: what its elements are wrong by is mostly more than was asked, and
+/// takes one round more.
+const COARSE_GROWTH: f64 = 16.0;
 
 /// Refuses a tolerance outside 1e-6 to 0.1.
 pub fn check_tolerance(tolerance: f64) -> Result<(), Error> {

@@ -121,6 +121,11 @@ fn compute(job: &Job, progress: &Progress) -> Result<Rendered, Error> {
         let lit = host.light(&geometry, sky.as_ref(), sun.as_ref())?;
         progress.stage("image");
         let camera = camera_input(&scene.camera);
+        if let Some(look) = host.look(&lit, &camera)?
+            && rounds.at_once(&look)
+        {
+            continue;
+        }
         let mut image = host.image(&lit, &camera, job.components)?;
         if rounds.again(&mut image.report) {
             continue;

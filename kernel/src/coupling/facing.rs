@@ -216,6 +216,12 @@ impl<'m> Clear<'m> {
         Clear { proven: memory, elements: 0, all: true }
     }
 
+    /// Forgets all that is proven.
+    pub fn clear(&mut self) {
+        self.proven.fill(0);
+        (self.elements, self.all) = (0, true);
+    }
+
     /// Whether rays need not find a side of a facet.
     pub fn has(&self, facet: usize, side: usize, sides: usize) -> bool {
         contains(self.proven, facet * sides + side)

@@ -94,6 +94,9 @@ fn departures(open: [bool; PARTS]) -> [f64; PARTS] {
 /// The most entries in closed form of one row.
 const MOST_CLOSED: usize = 4096;
 
+/// Entries in closed form up to which all are entered where nothing hides any.
+const CHEAP: usize = 1024;
+
 /// Entries in closed form that cost as much as a ray.
 const RAY: f64 = 0.35;
 
@@ -355,13 +358,25 @@ impl Tracer<'_, '_> {
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
-        let limit = (2 * most as usize).min(MOST_CLOSED);
+        let limit = (2 * most as usize).clamp(CHEAP, MOST_CLOSED);
         let possible = Clear::possible(self.scene, self.facing, &receiver, count);
-        if possible == 0 || possible > limit || !self.is_worth(start, possible, most, tally)? {
+        if possible == 0 || possible > limit {
             return Some(false);
         }
         let mut clear = Clear::new(proven);
-        clear.prove(self.scene, self.facing, &receiver, limit, count);
+        clear.all = false;
+        if possible <= CHEAP {
+            clear.all = true;
+            clear.prove(self.scene, self.facing, &receiver, limit, count);
+        }
+        // what is all known needs no rays, and is exact
+        if !clear.all {
+            if !self.is_worth(start, possible, most, tally)? {
+                return Some(false);
+            }
+            clear.clear();
+            clear.prove(self.scene, self.facing, &receiver, limit, count);
+        }
         *tally = Tally::default();
         if !clear.all || self.scene.largest_specular() > 0.0 {
             self.rays(start, (FEWEST, most), [false; BINS], Some(&clear), tally)?;

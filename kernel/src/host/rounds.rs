@@ -23,6 +23,11 @@ use crate::view::estimate::Limit;
 ///     let settings = rounds.settings(Settings::default());
 ///     let geometry = host.geometry(&mut memory, &input, &settings)?;
 ///     let lit = host.light(&geometry, Some(&sky), None)?;
+///     if let Some(look) = host.look(&lit, &camera)?
+///         && rounds.at_once(&look)
+///     {
+///         continue;
+///     }
 ///     let mut image = host.image(&lit, &camera, false)?;
 ///     if !rounds.again(&mut image.report) {
 ///         break image;
@@ -57,14 +62,8 @@ impl Rounds {
     /// Whether another round is wanted after one with this report. The report becomes that of all rounds, against the
     /// error that was asked for.
     pub fn again(&mut self, report: &mut Report) -> bool {
+        let round = self.round(report);
         self.done += 1;
-        let round = Round {
-            tolerance: self.tolerance,
-            estimate: report.error_estimate,
-            by_visibility: report.limited_by == Limit::Visibility.name(),
-            rays: report.rays.visibility,
-            bytes: report.bytes.coupling,
-        };
         self.seconds.add(&report.seconds);
         self.rays.add(&report.rays);
         report.tolerance = self.asked;
@@ -74,5 +73,34 @@ impl Rounds {
         self.last = Some(round);
         self.tolerance = next.unwrap_or(self.tolerance);
         next.is_some()
+    }
+
+    /// Whether another round is wanted before the image of the present one is made, by the report of a part of it
+    /// ([`super::Host::look`]).
+    pub fn at_once(&mut self, report: &Report) -> bool {
+        let round = self.round(report);
+        let next = rounds::at_once(self.asked, &round, self.last.as_ref(), self.done + 1);
+        if let Some(next) = next {
+            (self.tolerance, self.last) = (next, Some(round));
+            self.done += 1;
+            self.seconds.add(&report.seconds);
+            self.rays.add(&report.rays);
+        } else {
+            // what comes before the image counts with it
+            self.seconds.image += report.seconds.image;
+            self.rays.primary += report.rays.primary;
+            self.rays.chain += report.rays.chain;
+        }
+        next.is_some()
+    }
+
+    fn round(&self, report: &Report) -> Round {
+        Round {
+            tolerance: self.tolerance,
+            estimate: report.error_estimate,
+            by_visibility: report.limited_by == Limit::Visibility.name(),
+            rays: report.rays.visibility,
+            bytes: report.bytes.coupling,
+        }
     }
 }

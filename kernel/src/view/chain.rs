@@ -8,7 +8,7 @@ mod straight;
 mod sunlight;
 
 use crowd::{CROWDED, Surroundings};
-pub(crate) use gather::GATHERS;
+pub(crate) use gather::{CAUTION, GATHERS};
 use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
 use straight::OpenAt;
@@ -50,8 +50,12 @@ pub struct ChainSettings {
 /// Lobes of this axis ratio and above are narrow: cells of a signature may miss their highlights.
 pub const APART: f64 = 10.0;
 
-/// [`ChainSettings::gather`] where all pixels of an image may take rays.
-const GATHER_ALL: f64 = 0.6;
+/// [`ChainSettings::gather`] where all pixels of an image may take rays: what elements tell of their own errors is too little
+/// beside steps and slits.
+const GATHER_ALL: f64 = 0.1;
+
+/// The same where the solution is as fine as the image.
+const GATHER_MANY: f64 = 0.6;
 
 impl ChainSettings {
     /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
@@ -64,7 +68,7 @@ impl ChainSettings {
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
         let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
-            GATHER_ALL
+            if solution > image { GATHER_ALL } else { GATHER_MANY }
         } else {
             // most of it would have to be mended, for which a finer solution costs less: what a solution leaves at worst
             self.gather * (solution / image).max(1.0)
@@ -195,6 +199,8 @@ pub struct Path {
     pub tail: f64,
     /// Expected squared error from the diffuse solution, relative to the reference radiance.
     pub variance: f64,
+    /// Sums of the expected errors of the elements met, each with one of its signs ([`sign`]).
+    pub signed: [f64; SIGNS],
     /// Expected error from sampling lobes, relative to the reference radiance.
     pub noise: f64,
     /// What n rays like this one miss of highlights that are seen in lobes, times n: the geometric mean of the brightest
@@ -375,6 +381,7 @@ impl Fan<'_> {
         path.noise += share * self.path.noise;
         // rays of a lobe meet the same elements: their errors are taken as one
         path.variance += share * self.path.variance;
+        path.signed.iter_mut().zip(self.path.signed).for_each(|(to, from)| *to += share * from);
     }
 }
 
@@ -732,7 +739,24 @@ impl Solved<'_> {
             *to += share * FRAC_1_PI * irradiance;
         }
         path.variance += weight * weight * variance;
+        if leg.gathered.is_none() {
+            // a ray from a point, or of a lobe
+            let error = weight * sqrt(variance);
+            path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
+        }
     }
+}
+
+/// Sets of signs of the errors of elements.
+pub(crate) const SIGNS: usize = 4;
+
+/// The sign of an unknown's error in one of the sets: errors of different elements are independent, so that squares of sums
+/// with such signs are what their sum's square is expected to be.
+#[inline(always)]
+fn sign(unknown: usize, set: usize) -> f64 {
+    // the upper bits of a product with the golden ratio are as good as random
+    let bits = (unknown as u32).wrapping_mul(0x9e37_79b9);
+    if (bits ^ (bits >> 15)).wrapping_mul(0x85eb_ca6b) >> (24 + set) & 1 == 1 { -1.0 } else { 1.0 }
 }
 
 /// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates, less what they

@@ -1,6 +1,7 @@
 //! The error estimate of an image: its parts, their sum and the largest of them.
 
 use crate::base::math::sqrt;
+use crate::view::chain::CAUTION;
 use crate::view::image::Tally;
 
 /// The largest part of an error estimate.
@@ -31,10 +32,6 @@ impl Limit {
         }
     }
 }
-
-/// On the calibration's scenes the true error of the diffuse solution is up to so many times what its halves and
-/// quarters, and parts of the rays from points, tell, in nineteen of twenty: a few elements may carry it.
-const CAUTION: f64 = 1.9;
 
 /// One pixel in some hundreds is wrong by ten to twenty times what is expected of it: the mean square of the errors of n
 /// pixels differs from the expected one by the more the fewer they are, one and so many parts of n^-1/2 in nineteen of
