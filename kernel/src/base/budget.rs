@@ -2,7 +2,7 @@
 //!
 //! | share | of | size | meaning | why this size |
 //! |---|---|---|---|---|
-//! | [`solution`](ErrorBudget::solution) | | as asked | error of the diffuse solution: a row's rays are as many as keep its error, times the diffuse reflectance, below it | asked for; rounds of images choose it ([`crate::rounds`]) |
+//! | [`solution`](ErrorBudget::solution) | | as asked | error of the diffuse solution: a row's rays are as many as keep its error, times the diffuse reflectance, below it | asked for; rounds of images choose it |
 //! | [`elements`](ErrorBudget::elements) | solution² | 0.06 | expected squared error of the radiance by a triangle's unevenness, from which on it is quartered | elements add a quarter to what rows' rays leave |
 //! | [`row_chains`](ErrorBudget::row_chains) | solution | 0.001 | product of reflectances at which mirror chains of rows end | cut chains are a bound that is certified: it must not be felt |
 //! | [`solver`](ErrorBudget::solver) | solution | 0.001 | bound on the distance of the radiances from the system's solution | a sweep gains a factor 1/q: as for `row_chains` |

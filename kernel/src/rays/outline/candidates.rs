@@ -265,17 +265,16 @@ impl<'m> Candidates<'m> {
         let outlines = self.active.head(active.div_ceil(WIDTH));
         let counted = run_wide(isa, Contour { frame: &frame, basis, active: outlines });
         let crossings = (&mut *self.crossings, &mut *self.sorted);
-        let found = circles::look(isa, (&frame, basis), (outlines, one), &over, goal, crossings)?;
+        let fronts = |k: usize| f64::from(over.counted) * whole[k] + counted[k];
+        let contour = [0, 1, 2, 3].map(|k| whole[k] - fronts(k));
+        let found = circles::look(isa, (&frame, basis), (outlines, one, contour), &over, goal, crossings)?;
         let mut values = found.values;
         if !found.is_open {
             for (k, value) in values.iter_mut().enumerate() {
-                *value += whole[k] - (f64::from(over.counted) * whole[k] + counted[k]);
+                *value += contour[k];
             }
         }
-        for k in [0, 2] {
-            values[k] = values[k].min(whole[k]).max(0.0);
-        }
-        Some(OpenSky { error: found.error, ..lit(values) })
+        Some(OpenSky { error: found.error, ..lit(bounded(values, whole, frame.above)) })
     }
 
     /// The facets straight over a point.
@@ -306,6 +305,17 @@ impl<'m> Candidates<'m> {
         }
         over
     }
+}
+
+/// Open shares and heights within what is possible: a share is at most the whole one, and heights are at most shares on
+/// either side of the horizon.
+fn bounded([all, high, near, near_high]: [f64; 4], whole: [f64; 4], above: bool) -> [f64; 4] {
+    let all = all.min(whole[0]).max(0.0);
+    let near = near.min(whole[2]).max(0.0).min(all);
+    let sign = if above { 1.0 } else { -1.0 };
+    let near_high = sign * (sign * near_high).min(near).max(0.0);
+    let far_high = -sign * (-sign * (high - near_high)).min(all - near).max(0.0);
+    [all, near_high + far_high, near, near_high]
 }
 
 /// What is straight over a point: all facets, those that count, and the backs less the fronts of closed bodies.
