@@ -6,7 +6,7 @@
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
-use crate::base::math::{PI, Vec3, clamp, narrow};
+use crate::base::math::{PI, Vec3, clamp, fabs, narrow};
 use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
 use crate::coupling::word::EMPTY;
@@ -22,6 +22,13 @@ const DEPARTURE: f64 = 2.0;
 
 /// The most by which a row's entries are multiplied.
 const MOST_SCALE: f64 = 2.0;
+
+/// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
+const SAME: f64 = 1e-6;
+
+/// Mean square departure from a linear function, in squares of the goal, from which on the middles of the quarters are too
+/// few: the row's rays tell the sky then.
+const MOST_DEPARTURE: f64 = 4.0;
 
 /// Values of one unknown.
 pub fn stride(bands: usize) -> usize {
@@ -58,7 +65,11 @@ impl<'a> Straight<'a> {
     pub fn scale(&self, unknown: usize, bands: usize, row: &Row) -> f64 {
         match self.of(unknown, bands) {
             Some((values, _)) if row.state >= TRACED && row.blocked > 0.0 => {
-                clamp(values.at(3 * bands) / row.blocked, 1.0 / MOST_SCALE, MOST_SCALE)
+                let blocked = values.at(3 * bands);
+                if fabs(blocked - row.blocked) < SAME {
+                    return 1.0;
+                }
+                clamp(blocked / row.blocked, 1.0 / MOST_SCALE, MOST_SCALE)
             }
             _ => 1.0,
         }
@@ -215,7 +226,7 @@ fn row(
             departure = departure.max(DEPARTURE * scale * scale * square);
         }
     }
-    Some(departure + error)
+    (departure <= MOST_DEPARTURE * of.goal * of.goal).then_some(departure + error)
 }
 
 /// The middle of one of a triangle's quarters.

@@ -708,11 +708,8 @@ impl Solved<'_> {
         {
             variance = variance.max(CROWDED * CROWDED);
         }
-        let open = if leg.gathered.is_some() {
-            self.open_at(surface, unknown, weight, local, how.outlook)
-        } else {
-            None
-        };
+        let open =
+            if leg.gathered.is_some() { self.open_at(surface, unknown, local, how.outlook) } else { None };
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {

@@ -3,7 +3,6 @@
 use super::gather::BANDS;
 use super::{Outlook, Solved, linear};
 use crate::base::index::{Index, IndexMut};
-use crate::base::math::clamp;
 use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
@@ -11,12 +10,9 @@ use crate::rays::surface::Surface;
 /// Part of the tolerance that circles may leave at a point.
 const PART: f64 = 0.25;
 
-/// Points that count less than this many tolerances take what their elements hold: that is seldom wrong by more than a part
-/// of the sky.
-const LEAST: f64 = 4.0;
-
-/// The most by which what is blocked at a point may differ from the element's linear function.
-const MOST: f64 = 2.0;
+/// The most by which what is blocked at a point may differ from the element's linear function, as a factor either way: beyond
+/// it nothing tells what arrives from what is blocked.
+const MOST_BLOCKED: f64 = 2.0;
 
 /// The straight sky at a point.
 pub(super) struct OpenAt<'a> {
@@ -34,21 +30,20 @@ pub(super) struct OpenAt<'a> {
 }
 
 impl<'a> Solved<'a> {
-    /// The straight sky at a point whose light counts `weight`. `None` where outlines do not tell it, or it counts too
-    /// little.
+    /// The straight sky at a point. `None` where outlines do not tell it, or what is blocked there is far from what the
+    /// element's linear function says.
     #[inline(never)]
     pub(super) fn open_at(
         &self,
         surface: &Surface,
         unknown: usize,
-        weight: f64,
         local: Local,
         outlook: &mut Outlook<'_>,
     ) -> Option<OpenAt<'a>> {
         let sky = self.light.sky.as_ref()?;
         let bands = self.shape.bands;
         let (held, _) = self.straight.of(unknown, bands)?;
-        if bands > BANDS || weight < LEAST * self.settings.budget.image {
+        if bands > BANDS {
             return None;
         }
         let basis = straight::basis(self.bvh, sky)?;
@@ -56,13 +51,17 @@ impl<'a> Solved<'a> {
         if !candidates.prepare(self.scene, self.bvh, (surface.facet, surface.side)) {
             return None;
         }
-        let goal = PART * self.settings.budget.image / weight;
+        // whatever the point counts: bands of different weights get the same bits
+        let goal = PART * self.settings.budget.image;
         let open = candidates.open(self.scene, self.bvh, surface.point, basis, goal)?;
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
         let share = open.values[0];
         let blocked = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
-        let ratio = if blocked > 0.0 { clamp((1.0 - share) / blocked, 1.0 / MOST, MOST) } else { 1.0 };
+        let ratio = if blocked > 0.0 { (1.0 - share) / blocked } else { 1.0 };
+        if !(1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio) {
+            return None;
+        }
         Some(OpenAt { irradiance, held, share, ratio, variance: open.error * open.error })
     }
 }
