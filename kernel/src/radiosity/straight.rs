@@ -24,7 +24,7 @@ const DEPARTURE: f64 = 2.0;
 const MOST_SCALE: f64 = 2.0;
 
 /// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
-const SAME: f64 = 1e-6;
+pub const SAME: f64 = 1e-6;
 
 /// Mean square departure from a linear function, in squares of the goal, from which on the middles of the quarters are too
 /// few: the row's rays tell the sky then.
@@ -201,7 +201,14 @@ fn row(
     if count == 0 {
         return Some(0.0);
     }
-    values.set(3 * bands, blocked.iter().sum::<f64>() / count as f64);
+    let hidden = blocked.iter().sum::<f64>() / count as f64;
+    let row = of.coupling.row(unknown);
+    let least = row.blocked / MOST_SCALE - SAME;
+    if row.state >= TRACED && !(least..=row.blocked * MOST_SCALE + SAME).contains(&hidden) {
+        // the row's rays have missed what hides the sky: nothing says what comes from there
+        return None;
+    }
+    values.set(3 * bands, hidden);
     if count == QUARTERS {
         values.set(3 * bands + 1, 2.0 * (blocked[1] - blocked[0]));
         values.set(3 * bands + 2, 2.0 * (blocked[2] - blocked[0]));

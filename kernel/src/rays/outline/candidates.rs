@@ -307,10 +307,16 @@ impl<'m> Candidates<'m> {
     }
 }
 
+/// Open share that is rounding of the contour's sum: nothing is open.
+const CLOSED: f64 = 1e-6;
+
 /// Open shares and heights within what is possible: a share is at most the whole one, and heights are at most shares on
 /// either side of the horizon.
 fn bounded([all, high, near, near_high]: [f64; 4], whole: [f64; 4], above: bool) -> [f64; 4] {
-    let all = all.min(whole[0]).max(0.0);
+    let all = all.min(whole[0]);
+    if all < CLOSED {
+        return [0.0; 4];
+    }
     let near = near.min(whole[2]).max(0.0).min(all);
     let sign = if above { 1.0 } else { -1.0 };
     let near_high = sign * (sign * near_high).min(near).max(0.0);

@@ -3,6 +3,7 @@
 use super::gather::BANDS;
 use super::{Outlook, Solved, linear};
 use crate::base::index::{Index, IndexMut};
+use crate::base::math::fabs;
 use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
@@ -58,7 +59,8 @@ impl<'a> Solved<'a> {
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
         let share = open.values[0];
         let blocked = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
-        let ratio = if blocked > 0.0 { (1.0 - share) / blocked } else { 1.0 };
+        let same = fabs(1.0 - share - blocked) < straight::SAME;
+        let ratio = if same { 1.0 } else { (1.0 - share) / blocked };
         if !(1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio) {
             return None;
         }
