@@ -408,8 +408,8 @@ fn sharpen(
         for (k, (gradient, part)) in [&mut *first, &mut *second].into_iter().zip(&mut parts).enumerate() {
             let own = direct.at((k + 1) * bands + band);
             // exact for one radiance everywhere
-            *part = own + l * blocked[k + 1];
-            let rest = gradient.at(band) - own - l * (blocked[k + 1] - short[k]);
+            *part = own + l * blocked.at(k + 1);
+            let rest = gradient.at(band) - own - l * (blocked.at(k + 1) - short.at(k));
             gradient.set(band, rest);
         }
         let spread = [(square.at(band) - l * seen).max(0.0)];

@@ -150,7 +150,8 @@ impl<'m> Candidates<'m> {
     /// Finds what matters to the points of a facet's side. False where that is too much: rays cost less there.
     pub fn prepare(&mut self, scene: &Scene<'_>, bvh: &Bvh<'_>, (facet, side): (usize, usize)) -> bool {
         let (outlines, isa) = (bvh.outlines(), bvh.isa());
-        if self.lists.is_empty() || outlines.is_empty() {
+        // without the standard library meshes have no outlines
+        if cfg!(not(feature = "std")) || self.lists.is_empty() || outlines.is_empty() {
             return false;
         }
         let name = (2 * facet + side + 1) as u32;
@@ -249,7 +250,7 @@ impl<'m> Candidates<'m> {
         goal: f64,
     ) -> Option<OpenSky> {
         let (known, isa) = (bvh.outlines(), bvh.isa());
-        if self.list.side == 0 || self.list.edges == CROWDED {
+        if cfg!(not(feature = "std")) || self.list.side == 0 || self.list.edges == CROWDED {
             return None;
         }
         let frame = Frame::new(point, self.normal, basis);
