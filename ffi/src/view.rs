@@ -220,7 +220,7 @@ impl Out<'_> {
 /// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
 ///   and sun, mirrored diffuse. Null: not wanted
 /// - `component_count`: number of values that there is room for: three times `pixel_count`
-/// - `tally`: receives what was done, for [`blik_get_report`]; its `struct_size` is set before. Null: not wanted
+/// - `tally`: receives what was done, for `blik_get_report`; its `struct_size` is set before. Null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -326,7 +326,7 @@ fn paint(
 /// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
 ///   and sun, mirrored diffuse. Null: not wanted
 /// - `component_count`: number of values that there is room for: three times `pixel_count`
-/// - `tally`: receives what was done, for [`blik_get_report`]; its `struct_size` is set before. Null: not wanted
+/// - `tally`: receives what was done, for `blik_get_report`; its `struct_size` is set before. Null: not wanted
 ///
 /// # Safety
 /// Pointers are null or valid, arrays as long as stated.
@@ -435,7 +435,7 @@ const RAYS: usize = 256;
 /// Radiance against rays.
 ///
 /// - `solution`: the solution
-/// - `rays`: the rays, as for [`blik_closest_hits`]
+/// - `rays`: the rays, as for `blik_closest_hits`
 /// - `count`: number of rays
 /// - `radiance`: receives one value a ray and band, bands innermost
 /// - `radiance_count`: number of values that there is room for: `count` x bands

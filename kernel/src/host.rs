@@ -288,8 +288,8 @@ impl Host {
     /// The light of a scene, solved: no visibility is computed again.
     ///
     /// # Errors
-    /// What [`Light::new`] refuses, radiances above 1e37 ([`limits::check_radiance`],
-    /// [`limits::check_highlights`]), a system that diverges.
+    /// What [`Light::new`] refuses, radiances above 1e37 ([`crate::radiosity::limits::check_radiance`],
+    /// [`crate::radiosity::limits::check_highlights`]), a system that diverges.
     pub fn light<'g>(
         &self,
         geometry: &'g Geometry<'g>,

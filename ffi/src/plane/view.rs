@@ -143,7 +143,7 @@ pub unsafe extern "C" fn blik_plane_image(
 /// Radiance against rays.
 ///
 /// - `solution`: the solution
-/// - `rays`: the rays, as for [`blik_plane_first_hits`], which start on no body
+/// - `rays`: the rays, as for `blik_plane_first_hits`, which start on no body
 /// - `count`: number of rays
 /// - `out`: receives one sample a ray
 /// - `out_count`: number of samples that there is room for: `count`

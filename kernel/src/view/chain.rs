@@ -199,7 +199,7 @@ pub struct Path {
     pub tail: f64,
     /// Expected squared error from the diffuse solution, relative to the reference radiance.
     pub variance: f64,
-    /// Sums of the expected errors of the elements met, each with one of its signs ([`sign`]).
+    /// Sums of the expected errors of the elements met, each with one of its signs (`sign`).
     pub signed: [f64; SIGNS],
     /// Expected error from sampling lobes, relative to the reference radiance.
     pub noise: f64,

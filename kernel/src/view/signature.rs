@@ -1,7 +1,7 @@
 //! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
 //!
 //! Rays through cells tell all but what the first mirror or narrow lobe shows of the sun, which is found facet by facet
-//! ([`glints`]) and may be far smaller than a cell.
+//! (`glints`) and may be far smaller than a cell.
 
 mod glints;
 

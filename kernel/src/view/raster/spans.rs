@@ -16,7 +16,7 @@ plain_struct! {
         pub end: f64,
         /// Nearness at 0, and its slope.
         pub near: [f64; 2],
-        /// The facet, with [`BACK`] where its back shows.
+        /// The facet, with `BACK` where its back shows.
         pub key: u64,
     }
 }
