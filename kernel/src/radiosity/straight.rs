@@ -27,7 +27,7 @@ const MOST_SCALE: f64 = 2.0;
 pub const SAME: f64 = 1e-6;
 
 /// Mean square departure from a linear function, in squares of the goal, from which on the middles of the quarters are too
-/// few: the row's rays tell the sky then.
+/// few for a side that reflects nothing and of which the irradiance alone is asked: the row's rays tell the sky then.
 const MOST_DEPARTURE: f64 = 4.0;
 
 /// Values of one unknown.
@@ -233,7 +233,8 @@ fn row(
             departure = departure.max(DEPARTURE * scale * scale * square);
         }
     }
-    (departure <= MOST_DEPARTURE * of.goal * of.goal).then_some(departure + error)
+    let reflects = of.scene.diffuse(of.scene.material(facet)).iter().any(|d| *d > 0.0);
+    (reflects || departure <= MOST_DEPARTURE * of.goal * of.goal).then_some(departure + error)
 }
 
 /// The middle of one of a triangle's quarters.
