@@ -1107,8 +1107,7 @@ static inline void blik_rounds_init(blik_rounds *rounds, double asked)
  *
  * Writes to tolerance of the rounds that of the next round's coupling, or 0 where the image is good enough, would hardly
  * be better, would take too much, or has had three rounds. The first round is coarser than asked where that is little,
- * since rays from the image's points find the rest. An estimate of up to one and three quarters of the error asked for
- * passes, after a round coarser than that up to 1.35.
+ * since rays from the image's points find the rest.
  *
  *   rounds  the rounds, set by blik_rounds_init and then by nothing but this call
  *   report  the report of the image of the last round; null before the first
