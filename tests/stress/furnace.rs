@@ -35,8 +35,11 @@ fn a_closed_box_is_a_white_furnace() {
                 "{what}: facets {facets:.1e}, pixels {pixels:.1e}, estimate {estimate:.1e}, {sweeps} sweeps"
             );
             assert!(facets <= allowed && pixels <= allowed, "{what}: {facets:.1e} {pixels:.1e}");
-            // the estimate is one of the exact pixels
-            assert!(pixels <= estimate + PIXEL.error, "{what}: {pixels:.1e}, estimated {estimate:.1e}");
+            // the estimate is one of the exact pixels, which f32 holds to a unit in the last place
+            assert!(
+                pixels <= estimate + PIXEL.error.max(1.2e-7),
+                "{what}: {pixels:.1e}, estimated {estimate:.1e}"
+            );
             assert!(sweeps <= 400, "{what}: {sweeps} sweeps");
         }
     }

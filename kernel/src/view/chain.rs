@@ -709,11 +709,8 @@ impl Solved<'_> {
             variance = variance.max(CROWDED * CROWDED);
         }
         let wants_rays = self.wants_rays(surface, weight, variance);
-        let open = if leg.gathered.is_some() && (wants_rays || !self.holds_sky(unknown)) {
-            self.open_at(surface, unknown, local, how.outlook)
-        } else {
-            None
-        };
+        let open =
+            if leg.gathered.is_some() { self.open_at(surface, unknown, local, how.outlook) } else { None };
         if wants_rays && let Some(gathered) = leg.gathered.as_deref_mut() {
             let open = open.as_ref();
             let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors, open };

@@ -31,13 +31,6 @@ pub(super) struct OpenAt<'a> {
 }
 
 impl<'a> Solved<'a> {
-    /// Whether an element's linear function tells its straight sky as well as is asked of points.
-    #[inline]
-    pub(super) fn holds_sky(&self, unknown: usize) -> bool {
-        let most = PART * self.settings.budget.image;
-        self.straight.of(unknown, self.shape.bands).is_none_or(|(_, square)| square <= most * most)
-    }
-
     /// The straight sky at a point. `None` where outlines do not tell it, or what is blocked there is far from what the
     /// element's linear function says.
     #[inline(never)]
