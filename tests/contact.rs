@@ -158,7 +158,7 @@ fn generated(index: u64) -> (String, Case, CameraInput) {
             mesh.rectangle(x + y, z, -x, 1, 1);
             mesh.rectangle(x + y, -y, z, 1, 1);
             // on the floor, for every other room
-            if index % 8 == 0 {
+            if index.is_multiple_of(8) {
                 box_on_floor(
                     &mut mesh,
                     dvec3(between(0.2, 0.4), between(0.2, 0.4), 0.0),
@@ -201,7 +201,7 @@ fn generated(index: u64) -> (String, Case, CameraInput) {
     };
     let mut material = || {
         let diffuse = between(0.2, 0.8);
-        let specular = if index % 3 == 0 { between(0.1, 0.4).min(0.95 - diffuse) } else { 0.0 };
+        let specular = if index.is_multiple_of(3) { between(0.1, 0.4).min(0.95 - diffuse) } else { 0.0 };
         Material::new(diffuse, specular.max(0.0))
     };
     let materials = [material(), material(), material()];
@@ -209,7 +209,7 @@ fn generated(index: u64) -> (String, Case, CameraInput) {
     let ground = if matches!(model, SkyModel::Uniform) { 1.0 } else { 0.0 };
     let mut case = Case::new(mesh, &materials).sky(SkyOf::new(model, &[1.0], &[ground]));
     if index % 5 < 2 {
-        let half = if index % 2 == 0 { 0.0 } else { 0.2665 };
+        let half = if index.is_multiple_of(2) { 0.0 } else { 0.2665 };
         let direction = [between(0.1, 0.8), between(-0.8, 0.3), between(0.4, 1.0)];
         case = case.sun(SunOf::new(direction, &[std::f64::consts::PI], half));
     }
