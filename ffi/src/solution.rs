@@ -192,7 +192,7 @@ impl Plan {
         light.and::<f32>(self.samples).join(self.sizes.solution.need())
     }
 
-    /// All bytes, with beams on so many lanes.
+    /// All bytes, with beams on the given number of lanes.
     fn bytes(&self, lanes: usize) -> Result<usize, blik_error> {
         let all = self.kept().join(self.sizes.scratch()).and::<u8>(self.sizes.beams(lanes));
         let size = all.bytes()?.checked_add(head::<blik_solution>());

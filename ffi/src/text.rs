@@ -77,7 +77,7 @@ pub unsafe extern "C" fn blik_error_text(error: *const blik_error, text: *mut c_
 /// Digits of a number of double precision that are told.
 const DIGITS: i32 = 10;
 
-/// A number of so many digits: the least.
+/// The least number of a given count of digits.
 const UNIT: u64 = 10u64.pow(DIGITS as u32 - 1);
 
 /// A text of the caller's in the making.

@@ -44,7 +44,7 @@ pub(crate) trait Sink {
     fn back(&mut self) {}
     /// A lobe is met, around the direction `mirrored`; `through` includes its reflectance.
     fn glossy(&mut self, _hit: &Hit, _mirrored: Vec2, _lobe: &PlaneLobe, _leg: &PathState) {}
-    /// A chain is cut that could still bring so much of the brightest light.
+    /// A chain is cut that could still bring the share `throughput` of the brightest light.
     fn lost(&mut self, _throughput: f64) {}
 }
 
