@@ -300,12 +300,14 @@ fn build(
 
 /// Bytes of memory with which [`blik_coupling_init`] can begin. What the rows take is not known before they are computed:
 ///
-///     for (;;) {
-///         memory = realloc(memory, bytes);
-///         status = blik_coupling_init(scene, &settings, NULL, memory, bytes, &error, &coupling);
-///         if (status != BLIK_ERROR_BUFFER_TOO_SMALL) break;
-///         bytes = error.needed;
-///     }
+/// ```c
+/// for (;;) {
+///     memory = realloc(memory, bytes);
+///     status = blik_coupling_init(scene, &settings, NULL, memory, bytes, &error, &coupling);
+///     if (status != BLIK_ERROR_BUFFER_TOO_SMALL) break;
+///     bytes = error.needed;
+/// }
+/// ```
 ///
 /// - `scene`: the scene
 /// - `settings`: the settings

@@ -189,8 +189,17 @@ fn name(code: &str) -> String {
 /// A comment without what only Rust's documentation needs: paragraphs on safety and the brackets of links.
 fn for_c(comment: Vec<String>) -> Vec<String> {
     let end = comment.iter().position(|line| line == "# Safety").unwrap_or(comment.len());
-    let mut lines: Vec<String> =
-        comment[..end].iter().map(|line| line.replace("[`", "").replace("`]", "").replace('`', "")).collect();
+    // fenced code stands four columns in
+    let mut fenced = false;
+    let mut lines = Vec::new();
+    for line in &comment[..end] {
+        if line.starts_with("```") {
+            fenced = !fenced;
+        } else {
+            let line = line.replace("[`", "").replace("`]", "").replace('`', "");
+            lines.push(if fenced { format!("    {line}") } else { line });
+        }
+    }
     while lines.last().is_some_and(String::is_empty) {
         lines.pop();
     }

@@ -1,12 +1,12 @@
 //! The sky that elements see straight, by outlines: no rays, and exact where nothing that may cover the sky is covered
 //! itself.
 //!
-//! Each element is looked at from the middles of its four quarters. Those at its corners make the gradient; by how much the
-//! middle one departs from their mean tells what the linear function over the element leaves out.
+//! Each element is looked at from the middles of its four quarters, and where a linear function over it leaves out more than
+//! is wanted, from those of their quarters: an edge of what hides the sky crosses it.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
-use crate::base::math::{PI, Vec3, clamp, fabs, narrow};
+use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
 use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
 use crate::coupling::word::EMPTY;
@@ -17,8 +17,16 @@ use crate::scene::sky::Sky;
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
 
-/// Mean square departure from a linear function over that of the middle from the corners: as for what rows see.
-const DEPARTURE: f64 = 2.0;
+/// Mean square departure from a linear function over what four points show of it, three of which the function meets: twice
+/// the square of that of the middle from the corners, as for what rows see.
+const FEW_POINTS: f64 = 8.0 / 3.0;
+
+/// Mean square departure from a linear function that four points may not show, over the mean square of the function's own
+/// slope: a shadow's edge along a narrow facet had a twelfth of it, where the points showed a hundredth of that.
+const SLOPE: f64 = 0.1;
+
+/// Depth of the smallest quarters that are looked at: 64 points, as rows have rays from.
+const DEEPEST: u32 = 3;
 
 /// The most by which a row's entries are multiplied.
 const MOST_SCALE: f64 = 2.0;
@@ -26,9 +34,12 @@ const MOST_SCALE: f64 = 2.0;
 /// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
 pub const SAME: f64 = 1e-6;
 
-/// Mean square departure from a linear function, in squares of the goal, from which on the middles of the quarters are too
-/// few for a side that reflects nothing and of which the irradiance alone is asked: the row's rays tell the sky then.
+/// Mean square departure from a linear function, in squares of the goal, from which on quarters are cut again.
 const MOST_DEPARTURE: f64 = 4.0;
+
+/// Squared error of the mean, in squares of the goal, from which on the points are too few for a side that reflects nothing
+/// and of which the irradiance alone is asked: the row's rays tell the sky then.
+const MOST_MEAN: f64 = 0.5;
 
 /// Values of one unknown.
 pub fn stride(bands: usize) -> usize {
@@ -179,66 +190,145 @@ fn row(
     if !candidates.prepare(of.scene, of.bvh, (facet, side)) {
         return None;
     }
-    let corners = of.elements.corners(of.scene, unknown / of.scene.sides().max(1));
     let bands = of.scene.bands().clamp(1, MAX_BANDS);
-    let mut blocked = [0.0; QUARTERS];
-    let mut seen = [[0.0; MAX_BANDS]; QUARTERS];
-    let (mut outside, mut error) = ([false; QUARTERS], 0.0);
-    for number in 0..QUARTERS {
-        let open = candidates.open(of.scene, of.bvh, middle(&corners, number), basis, of.goal)?;
-        let seen = seen.get_mut(number)?.head_mut(bands);
-        irradiance(&open, of.sky, seen);
-        outside.set(number, !open.inside);
-        blocked.set(number, if open.inside { 0.0 } else { 1.0 - open.values[0] });
-        error += open.error * open.error / (QUARTERS * QUARTERS) as f64;
-        if candidates.is_clear() {
-            copy(values, seen);
-            values.set(3 * bands, 1.0 - open.values[0]);
-            return Some(0.0);
-        }
-    }
-    let count = outside.iter().filter(|o| **o).count();
-    if count == 0 {
+    let mut seen = [0.0; MAX_BANDS];
+    if candidates.is_clear() {
+        let corners = of.elements.corners(of.scene, unknown / of.scene.sides().max(1));
+        let open = candidates.open(of.scene, of.bvh, middle(&corners, 0, 0), basis, of.goal)?;
+        irradiance(&open, of.sky, seen.head_mut(bands));
+        copy(values, seen.head(bands));
+        values.set(3 * bands, if open.inside { 0.0 } else { 1.0 - open.values[0] });
         return Some(0.0);
     }
-    let hidden = blocked.iter().sum::<f64>() / count as f64;
+    let goal = of.goal * of.goal;
+    let reflects = of.scene.diffuse(of.scene.material(facet)).iter().any(|d| *d > 0.0);
+    let mut fit = fit(of, candidates, basis, unknown, 1)?;
+    for depth in 2..=DEEPEST {
+        if fit.departure(of.reference, bands) <= MOST_DEPARTURE * goal {
+            break;
+        }
+        fit = self::fit(of, candidates, basis, unknown, depth)?;
+    }
+    if fit.outside == 0 {
+        return Some(0.0);
+    }
     let row = of.coupling.row(unknown);
+    let hidden = fit.mean(bands);
     let least = row.blocked / MOST_SCALE - SAME;
     if row.state >= TRACED && !(least..=row.blocked * MOST_SCALE + SAME).contains(&hidden) {
         // the row's rays have missed what hides the sky: nothing says what comes from there
         return None;
     }
-    values.set(3 * bands, hidden);
-    if count == QUARTERS {
-        values.set(3 * bands + 1, 2.0 * (blocked[1] - blocked[0]));
-        values.set(3 * bands + 2, 2.0 * (blocked[2] - blocked[0]));
+    for band in 0..=bands {
+        let [mean, a, b] = fit.linear(band);
+        let [at_mean, at_a, at_b] =
+            if band < bands { [0, 1, 2].map(|k| k * bands + band) } else { [0, 1, 2].map(|k| 3 * bands + k) };
+        values.set(at_mean, mean);
+        values.set(at_a, a);
+        values.set(at_b, b);
     }
-    let mut departure: f64 = 0.0;
-    for band in 0..bands {
-        let of_quarter = |n: usize| if outside.at(n) { seen.get(n).map_or(0.0, |s| s.at(band)) } else { 0.0 };
-        let mean = (0..QUARTERS).map(of_quarter).sum::<f64>() / count as f64;
-        values.set(band, mean);
-        let corner = [0, 1, 2].map(of_quarter);
-        let scale = of.reference.at(band);
-        let scale = if scale > 0.0 { 1.0 / (PI * scale) } else { 0.0 };
-        if count == QUARTERS {
-            // from quarter to quarter barycentric weights change by a half
-            values.set(bands + band, 2.0 * (corner[1] - corner[0]));
-            values.set(2 * bands + band, 2.0 * (corner[2] - corner[0]));
-            let bend = of_quarter(3) - (corner[0] + corner[1] + corner[2]) / 3.0;
-            departure = departure.max(DEPARTURE * (scale * bend) * (scale * bend));
-        } else {
-            let spread = (0..QUARTERS).filter(|&n| outside.at(n)).map(|n| of_quarter(n) - mean);
-            let square = spread.map(|d| d * d).sum::<f64>() / count as f64;
-            departure = departure.max(DEPARTURE * scale * scale * square);
-        }
-    }
-    let reflects = of.scene.diffuse(of.scene.material(facet)).iter().any(|d| *d > 0.0);
-    (reflects || departure <= MOST_DEPARTURE * of.goal * of.goal).then_some(departure + error)
+    let departure = fit.departure(of.reference, bands);
+    // the mean of stratified points is wrong by an edge that crosses n^1/2 of their n quarters
+    let of_mean = departure / pow(fit.points as f64, 1.5);
+    (reflects || of_mean <= MOST_MEAN * goal).then_some(departure + fit.error)
 }
 
-/// The middle of one of a triangle's quarters.
-fn middle(corners: &[Vec3; 3], number: usize) -> Vec3 {
-    let (u, v) = quarter::out_of(number, (1.0 / 3.0, 1.0 / 3.0));
+/// Straight sky at the middles of an element's quarters of one depth: sums of what is seen and, last, of the share that is
+/// blocked, by which a linear function is fitted to them.
+struct Fit {
+    points: usize,
+    /// Points that are not inside a closed body; the others see nothing.
+    outside: usize,
+    /// Expected squared error of the mean by circles.
+    error: f64,
+    /// Of each band, and of what is blocked: sums of its values, of their products with both local coordinates, and of their
+    /// squares.
+    sums: [[f64; 4]; MAX_BANDS + 1],
+}
+
+/// Looks from the middles of the quarters of a depth.
+fn fit(
+    of: &Looking<'_>,
+    candidates: &mut Candidates<'_>,
+    basis: Basis,
+    unknown: usize,
+    depth: u32,
+) -> Option<Fit> {
+    let corners = of.elements.corners(of.scene, unknown / of.scene.sides().max(1));
+    let bands = of.scene.bands().clamp(1, MAX_BANDS);
+    let points = QUARTERS.pow(depth);
+    let mut fit = Fit { points, outside: 0, error: 0.0, sums: [[0.0; 4]; MAX_BANDS + 1] };
+    for number in 0..points {
+        let (u, v) = place(number, depth);
+        let open = candidates.open(of.scene, of.bvh, quarter::point(&corners, u, v), basis, of.goal)?;
+        fit.error += open.error * open.error / (points * points) as f64;
+        if open.inside {
+            continue;
+        }
+        fit.outside += 1;
+        let mut seen = [0.0; MAX_BANDS + 1];
+        irradiance(&open, of.sky, seen.head_mut(bands));
+        seen.set(bands, 1.0 - open.values[0]);
+        let (u, v) = (u - 1.0 / 3.0, v - 1.0 / 3.0);
+        for (sums, x) in fit.sums.iter_mut().zip(seen).take(bands + 1) {
+            let terms = [x, x * u, x * v, x * x];
+            sums.iter_mut().zip(terms).for_each(|(sum, x)| *sum += x);
+        }
+    }
+    Some(fit)
+}
+
+impl Fit {
+    /// Mean over the points outside.
+    fn mean(&self, of: usize) -> f64 {
+        self.sums.get(of).map_or(0.0, |s| s[0]) / self.outside.max(1) as f64
+    }
+
+    /// Mean, and least squares' gradients by the weights of corners 1 and 2; those are 0 where some points are inside.
+    fn linear(&self, of: usize) -> [f64; 3] {
+        let mean = self.mean(of);
+        let Some([_, u, v, _]) = self.sums.get(of).filter(|_| self.outside == self.points) else {
+            return [mean, 0.0, 0.0];
+        };
+        // the weights' second moments over the points are s, s and -s/2, where 4/3 s is by how much u and v determine them
+        let s = self.second_moment();
+        [mean, (u + 0.5 * v) / (0.75 * s), (v + 0.5 * u) / (0.75 * s)]
+    }
+
+    /// Sum of the squares of the weight of a corner less 1/3: 1/18 a point over the triangle, less that within the quarters.
+    fn second_moment(&self) -> f64 {
+        let n = self.points as f64;
+        n / 18.0 * (1.0 - 1.0 / n)
+    }
+
+    /// Largest mean square departure of a band from the linear function, over pi and relative to the reference radiance.
+    fn departure(&self, reference: &[f64], bands: usize) -> f64 {
+        let free = if self.outside == self.points { self.points - 3 } else { self.outside.max(1) };
+        let factor = if self.points == QUARTERS { FEW_POINTS } else { 1.0 };
+        let mut largest: f64 = 0.0;
+        for band in 0..bands {
+            let scale = reference.at(band);
+            let scale = if scale > 0.0 { 1.0 / (PI * scale) } else { 0.0 };
+            let Some([sum, u, v, square]) = self.sums.get(band) else { continue };
+            let [mean, a, b] = self.linear(band);
+            let rest = square - mean * sum - a * u - b * v;
+            let bend = factor * (rest / free as f64).max(0.0);
+            // four points may lie in a plane by chance
+            let slope =
+                if self.points == QUARTERS { SLOPE * (a * u + b * v) / self.points as f64 } else { 0.0 };
+            largest = largest.max(scale * scale * bend.max(slope));
+        }
+        largest
+    }
+}
+
+/// Where the middle of a quarter of a depth lies: weights of corners 1 and 2.
+fn place(number: usize, depth: u32) -> (f64, f64) {
+    (0..depth).fold((1.0 / 3.0, 1.0 / 3.0), |at, step| quarter::out_of(number >> (2 * step) & 3, at))
+}
+
+/// The middle of one of a triangle's quarters of a depth.
+fn middle(corners: &[Vec3; 3], number: usize, depth: u32) -> Vec3 {
+    let (u, v) = place(number, depth);
     quarter::point(corners, u, v)
 }
