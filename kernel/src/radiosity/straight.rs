@@ -25,8 +25,11 @@ const FEW_POINTS: f64 = 8.0 / 3.0;
 /// slope: a shadow's edge along a narrow facet had a twelfth of it, where the points showed a hundredth of that.
 const SLOPE: f64 = 0.1;
 
-/// Depth of the smallest quarters that are looked at: 64 points, as rows have rays from.
-const DEEPEST: u32 = 3;
+/// Depth of the smallest quarters that are looked at. Where irradiances are asked for, 64 points, as rows have rays from;
+/// images average over elements: 16 points took the airplane's elements twice the seconds and left its error.
+pub fn deepest(all_irradiances: bool) -> u32 {
+    if all_irradiances { 3 } else { 1 }
+}
 
 /// The most by which a row's entries are multiplied.
 const MOST_SCALE: f64 = 2.0;
@@ -146,6 +149,8 @@ pub struct Looking<'a> {
     pub reference: &'a [f64],
     /// Expected error of irradiance over pi to reach, relative to the largest radiance.
     pub goal: f64,
+    /// Depth of the smallest quarters that are looked at ([`deepest`]).
+    pub deepest: u32,
 }
 
 /// Straight sky of the unknowns of `range`, into their parts of [`Straight`]'s tables.
@@ -203,7 +208,7 @@ fn row(
     let goal = of.goal * of.goal;
     let reflects = of.scene.diffuse(of.scene.material(facet)).iter().any(|d| *d > 0.0);
     let mut fit = fit(of, candidates, basis, unknown, 1)?;
-    for depth in 2..=DEEPEST {
+    for depth in 2..=of.deepest {
         if fit.departure(of.reference, bands) <= MOST_DEPARTURE * goal {
             break;
         }

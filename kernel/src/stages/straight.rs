@@ -39,7 +39,8 @@ pub(super) fn fill<X: Executor>(
     let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
     let (Some(sky), false) = (&light.sky, memory.straight.is_empty()) else { return Ok(()) };
     let goal = settings::straight_goal(scene, &settings.budget);
-    let looking = Looking { scene, bvh, elements, coupling, sky, reference: memory.reference, goal };
+    let deepest = straight::deepest(settings.all_irradiances);
+    let looking = Looking { scene, bvh, elements, coupling, sky, reference: memory.reference, goal, deepest };
     let (bands, all) = (scene.bands(), elements.unknowns());
     let (part, stride) = (piece(bands)?, straight::stride(bands));
     let lanes = run.lanes().clamp(1, LOOKERS);
