@@ -139,6 +139,11 @@ fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
             let settings = rounds.settings(scene.settings(tolerance));
             let geometry = scene.geometry(host, &settings, &mut memory)?;
             let lit = scene.light(host, &geometry)?;
+            if let Some(look) = host.look(&lit, &scene.camera)?
+                && rounds.at_once(&look)
+            {
+                continue;
+            }
             let mut image = host.image(&lit, &scene.camera, false)?;
             if !rounds.again(&mut image.report) {
                 return Ok(image);
@@ -153,6 +158,9 @@ fn cold(host: &Host, scene: &Loaded, tolerance: f64, out: &Path) -> Answer {
         "seconds": seconds, "processor": processor,
         "estimate": report.error_estimate, "met": report.tolerance_met,
         "bytes": b.scene + b.bvh + b.coupling + b.light + b.image,
+        "rounds": report.rounds, "elements": report.elements, "geometry_seconds": report.seconds.coupling,
+        "light_seconds": report.seconds.light + report.seconds.radiosity, "image_seconds": report.seconds.image,
+        "row_rays": report.rays.visibility, "image_rays": report.rays.chain,
     }))
 }
 

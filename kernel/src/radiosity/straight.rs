@@ -37,7 +37,8 @@ const MOST_SCALE: f64 = 2.0;
 /// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
 pub const SAME: f64 = 1e-6;
 
-/// Mean square departure from a linear function, in squares of the goal, from which on quarters are cut again.
+/// Mean square departure of what is blocked from a linear function, in squares of the goal, from which on quarters are cut
+/// again.
 const MOST_DEPARTURE: f64 = 4.0;
 
 /// Squared error of the mean, in squares of the goal, from which on the points are too few for a side that reflects nothing
@@ -209,7 +210,8 @@ fn row(
     let reflects = of.scene.diffuse(of.scene.material(facet)).iter().any(|d| *d > 0.0);
     let mut fit = fit(of, candidates, basis, unknown, 1)?;
     for depth in 2..=of.deepest {
-        if fit.departure(of.reference, bands) <= MOST_DEPARTURE * goal {
+        // what is blocked alone decides: a band has the same bits whatever others there are
+        if fit.departure(bands) <= MOST_DEPARTURE * goal {
             break;
         }
         fit = self::fit(of, candidates, basis, unknown, depth)?;
@@ -232,7 +234,7 @@ fn row(
         values.set(at_a, a);
         values.set(at_b, b);
     }
-    let departure = fit.departure(of.reference, bands);
+    let departure = fit.largest_departure(of.reference, bands);
     // the mean of stratified points is wrong by an edge that crosses n^1/2 of their n quarters
     let of_mean = departure / pow(fit.points as f64, 1.5);
     (reflects || of_mean <= MOST_MEAN * goal).then_some(departure + fit.error)
@@ -306,24 +308,26 @@ impl Fit {
         n / 18.0 * (1.0 - 1.0 / n)
     }
 
-    /// Largest mean square departure of a band from the linear function, over pi and relative to the reference radiance.
-    fn departure(&self, reference: &[f64], bands: usize) -> f64 {
+    /// Mean square departure of one sum's values from the linear function.
+    fn departure(&self, of: usize) -> f64 {
         let free = if self.outside == self.points { self.points - 3 } else { self.outside.max(1) };
         let factor = if self.points == QUARTERS { FEW_POINTS } else { 1.0 };
-        let mut largest: f64 = 0.0;
-        for band in 0..bands {
+        let Some([sum, u, v, square]) = self.sums.get(of) else { return 0.0 };
+        let [mean, a, b] = self.linear(of);
+        let bend = factor * ((square - mean * sum - a * u - b * v) / free as f64).max(0.0);
+        // four points may lie in a plane by chance
+        let slope = if self.points == QUARTERS { SLOPE * (a * u + b * v) / self.points as f64 } else { 0.0 };
+        bend.max(slope)
+    }
+
+    /// The largest of all bands, of irradiance over pi relative to the reference radiance.
+    fn largest_departure(&self, reference: &[f64], bands: usize) -> f64 {
+        let of = |band: usize| {
             let scale = reference.at(band);
             let scale = if scale > 0.0 { 1.0 / (PI * scale) } else { 0.0 };
-            let Some([sum, u, v, square]) = self.sums.get(band) else { continue };
-            let [mean, a, b] = self.linear(band);
-            let rest = square - mean * sum - a * u - b * v;
-            let bend = factor * (rest / free as f64).max(0.0);
-            // four points may lie in a plane by chance
-            let slope =
-                if self.points == QUARTERS { SLOPE * (a * u + b * v) / self.points as f64 } else { 0.0 };
-            largest = largest.max(scale * scale * bend.max(slope));
-        }
-        largest
+            scale * scale * self.departure(band)
+        };
+        (0..bands).map(of).fold(0.0, f64::max)
     }
 }
 
