@@ -152,11 +152,18 @@ impl Record {
     }
 
     /// A target on which the sun shines from the direction `image` (as the radiosity wing packs it; 0: by lobes or curved
-    /// mirrors).
-    pub fn beam((unknown, (a, b)): (usize, Local), word: u16, weight: f64, image: u64) -> Record {
+    /// mirrors) by way of a last `mirror`, a facet.
+    pub fn beam(
+        (unknown, (a, b)): (usize, Local),
+        word: u16,
+        weight: f64,
+        (image, mirror): (u64, u32),
+    ) -> Record {
         // records of different images stay apart
         let apart = image.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 50;
-        let checks = [48, 32, 16, 0].map(|shift| f32::from((image >> shift) as u16));
+        // 24 bits of each are exact: 16 of the image above 8 of the mirror
+        let part = |k: u32| (image >> (16 * k) & 0xffff) << 8 | u64::from(mirror >> (8 * k) & 0xff);
+        let checks = [3, 2, 1, 0].map(|k| part(k) as f32);
         let key = (unknown as u64 | apart << 32) << 16 | u64::from(word);
         // where on the element it falls: weighted sums of the place, of its squared distance from the middle, and a count
         let gradient = [weight * a, weight * b].map(|x| x as f32);
@@ -179,7 +186,12 @@ impl Record {
 
     /// The image of a beam.
     pub fn image(&self) -> u64 {
-        self.checks.iter().fold(0, |image, part| image << 16 | *part as u64)
+        self.checks.iter().fold(0, |image, part| image << 16 | *part as u64 >> 8)
+    }
+
+    /// The last mirror of a beam, a facet.
+    pub fn mirror(&self) -> usize {
+        self.checks.iter().fold(0, |mirror, part| mirror << 8 | *part as usize & 0xff)
     }
 
     /// Adds up what two rays of a row found.

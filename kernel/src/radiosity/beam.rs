@@ -157,7 +157,8 @@ impl Tracer<'_, '_> {
                 // flux per unit of normal irradiance, the first cosine still to come
                 let (flux, word, arrival) = (scene.areas().at(facet), EMPTY, None);
                 let axis = Some(-self.sun.direction());
-                let chain = Chain { index, surface, direction: -toward, flux, word, arrival, axis };
+                let chain =
+                    Chain { index, surface, mirror: facet, direction: -toward, flux, word, arrival, axis };
                 rays.set(count, surface.leave(toward));
                 chains.set(count, Some(chain));
                 count += 1;
@@ -212,6 +213,7 @@ impl Tracer<'_, '_> {
             return Some(None);
         }
         let lobe = mirror.lobe.is_some();
+        chain.mirror = surface.facet;
         chain.axis = chain.axis.zip(surface.flat_mirror(scene)).map(|(axis, normal)| reflect(axis, normal));
         let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
         let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
@@ -227,7 +229,8 @@ impl Tracer<'_, '_> {
         let target = self.elements.locate(facet, side, u, v);
         let area = self.scene.areas().at(facet) * self.elements.share(target.0);
         let image = chain.axis.map_or(0, |axis| pack(-axis));
-        self.sink.push(Record::beam(target, chain.word, chain.flux / area, image))
+        let from = (image, if image == 0 { 0 } else { chain.mirror as u32 });
+        self.sink.push(Record::beam(target, chain.word, chain.flux / area, from))
     }
 }
 
@@ -244,6 +247,8 @@ struct Chain {
     index: u32,
     /// What it has met.
     surface: Surface,
+    /// The last mirror before it, a facet.
+    mirror: usize,
     direction: Vec3,
     /// Per unit of the sun's normal irradiance.
     flux: f64,
@@ -280,7 +285,7 @@ pub fn add(
         for record in row.targets {
             let (unknown, image) = (record.unknown(), record.image());
             if image != 0 {
-                images.note(elements.facet_sides(), elements.facet_side(unknown), image);
+                images.note(elements.facet_sides(), elements.facet_side(unknown), image, record.mirror());
             }
             let exposed = f64::from(coupling.row(unknown).exposed);
             if exposed == 0.0 {

@@ -8,7 +8,7 @@
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces};
-use crate::base::math::{FRAC_1_PI, Vec3, clamp, narrow, sqrt};
+use crate::base::math::{FRAC_1_PI, Vec3, clamp, frame, narrow, sqrt};
 use crate::base::octahedron;
 use crate::coupling::Record;
 use crate::radiosity::direct::Shape;
@@ -24,10 +24,48 @@ fn room(sides: usize) -> usize {
     sides.saturating_mul(ROOM.1).max(ROOM.0)
 }
 
+/// Places of one image: its direction; where the list goes on, and its [`Region`]; its [`Mirrors`].
+const PLACES: usize = 3;
+
 /// Places for the images of `sides` sides of facets: where each side's list begins, how many images there are, and the
-/// images with where the list goes on.
+/// images.
 pub fn places(sides: usize) -> usize {
-    sides.saturating_add(1).saturating_add(room(sides).saturating_mul(2))
+    sides.saturating_add(1).saturating_add(room(sides).saturating_mul(PLACES))
+}
+
+/// The facets that show an image: one or two, each counted from 1, or more than those.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mirrors(u64);
+
+impl Mirrors {
+    /// More than two.
+    const MANY: Mirrors = Mirrors(u64::MAX);
+
+    /// With one more.
+    fn with(self, mirror: usize) -> Mirrors {
+        let [first, second] = self.both();
+        let own = mirror as u64 + 1;
+        if self == Mirrors::MANY || first == own || second == own {
+            self
+        } else if first == 0 {
+            Mirrors(own)
+        } else if second == 0 {
+            Mirrors(first | own << 32)
+        } else {
+            Mirrors::MANY
+        }
+    }
+
+    fn both(self) -> [u64; 2] {
+        [self.0 & NEXT, self.0 >> 32]
+    }
+
+    /// The facets; `None` where there are more than two.
+    #[inline]
+    pub fn all(self) -> Option<impl Iterator<Item = usize>> {
+        let all = self.both().into_iter().filter(|mirror| *mirror > 0).map(|mirror| mirror as usize - 1);
+        (self != Mirrors::MANY).then_some(all)
+    }
 }
 
 /// Where a side's list would begin: it has too many images.
@@ -43,6 +81,7 @@ struct List<'a> {
 }
 
 impl<'a> List<'a> {
+    /// Images, and where the mirrors stand that show them.
     fn of(slots: &'a [u64], sides: usize, side: usize) -> List<'a> {
         let next = slots.get(side).copied().filter(|next| *next != MANY).unwrap_or(0);
         List { slots, sides, next, left: MOST }
@@ -50,16 +89,86 @@ impl<'a> List<'a> {
 }
 
 impl Iterator for List<'_> {
-    type Item = u64;
+    type Item = (u64, Region, Mirrors);
 
     #[inline]
-    fn next(&mut self) -> Option<u64> {
-        let place = self.sides + 1 + 2 * (self.next as usize).checked_sub(1)?;
+    fn next(&mut self) -> Option<(u64, Region, Mirrors)> {
+        let place = self.sides + 1 + PLACES * (self.next as usize).checked_sub(1)?;
         self.left = self.left.checked_sub(1)?;
-        let (packed, next) = (*self.slots.get(place)?, *self.slots.get(place + 1)?);
-        self.next = next;
-        Some(packed)
+        let &[packed, next, mirrors] = self.slots.get(place..place + PLACES)? else { return None };
+        self.next = next & NEXT;
+        Some((packed, Region((next >> 32) as u32), Mirrors(mirrors)))
     }
+}
+
+/// Where a list goes on, beside the region of the image before.
+const NEXT: u64 = u32::MAX as u64;
+
+/// Where the mirrors stand that show an image: a disc across its direction, in coordinates of [`frame`] in steps of
+/// [`Region::STEP`]. Both of the middle's have 11 bits, the radius, rounded up, 10.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Region(u32);
+
+impl Region {
+    /// Scene coordinates lie between -2 and 2.
+    const STEP: f64 = 1.0 / 512.0;
+
+    /// The radius that reaches everywhere.
+    const EVERYWHERE: u32 = 1023;
+
+    /// Middle and radius of a packed one.
+    fn disc(self) -> ([f64; 2], f64) {
+        let middle = [self.0 >> 21, self.0 >> 10 & 2047].map(|x| f64::from(x) * Region::STEP - 2.0);
+        let radius = self.0 & Region::EVERYWHERE;
+        (middle, if radius == Region::EVERYWHERE { f64::INFINITY } else { f64::from(radius) * Region::STEP })
+    }
+
+    /// The smallest that holds a disc.
+    fn new([x, y]: [f64; 2], radius: f64) -> Region {
+        let steps = |x: f64| clamp((x + 2.0) / Region::STEP + 0.5, 0.0, 2047.0) as u32;
+        // rounding of the middle moves it by up to 2^-1/2 steps
+        let radius = clamp(radius / Region::STEP + 1.75, 0.0, f64::from(Region::EVERYWHERE)) as u32;
+        Region(steps(x) << 21 | steps(y) << 10 | radius)
+    }
+
+    /// The disc about a facet, seen along an axis.
+    fn of(corners: &[Vec3; 3], axis: Vec3) -> ([f64; 2], f64) {
+        let (x, y) = frame(axis);
+        let [a, b, c] = corners.map(|corner| [corner.dot(x), corner.dot(y)]);
+        let middle = [0, 1].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+        let far = |p: [f64; 2]| distance(middle, p);
+        (middle, far(a).max(far(b)).max(far(c)))
+    }
+
+    /// The disc about this one and another.
+    fn with(self, middle: [f64; 2], radius: f64) -> Region {
+        let (own, own_radius) = self.disc();
+        let apart = distance(own, middle);
+        if apart + radius <= own_radius {
+            return self;
+        }
+        if !(own_radius < f64::INFINITY) {
+            return self;
+        }
+        let both = 0.5 * (apart + radius + own_radius).max(2.0 * radius);
+        let share = if apart > 0.0 { clamp((both - own_radius) / apart, 0.0, 1.0) } else { 0.0 };
+        Region::new([0, 1].map(|k| own[k] + share * (middle[k] - own[k])), both)
+    }
+
+    /// Whether lines through the ball of radius `reach` about a point, within an angle of sine `spread` of the axis, may meet
+    /// the disc.
+    #[inline]
+    fn may_meet(self, axis: Vec3, point: Vec3, reach: f64) -> bool {
+        let (middle, radius) = self.disc();
+        let (x, y) = frame(axis);
+        distance(middle, [point.dot(x), point.dot(y)]) <= radius + reach
+    }
+}
+
+/// Distance of two points of a plane.
+#[inline(always)]
+fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
+    sqrt((a - c) * (a - c) + (b - d) * (b - d))
 }
 
 /// Suns this close to each other (1 - cosine; 1.4e-7 rad) are one: directions are kept to 2e-9.
@@ -69,8 +178,17 @@ pub const SAME: f64 = 1e-14;
 /// beyond [`SAME`].
 const SEEN: f64 = 2.0 * SAME;
 
+/// Longest distance between two points of a scene, at most, in scene coordinates.
+const LONGEST: f64 = 4.0;
+
 /// Bits of each coordinate of a direction.
 const BITS: u32 = 31;
+
+/// The largest coordinate.
+const STEPS: u64 = (1 << BITS) - 1;
+
+/// Directions within [`SEEN`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
+const NEAR: i64 = 512;
 
 /// A direction in 63 bits, to 2e-9 rad; never 0.
 pub fn pack(direction: Vec3) -> u64 {
@@ -92,6 +210,41 @@ pub struct SunImages<'a> {
     pub thrown: &'a [f64],
 }
 
+/// The images of a side that may be seen from near a point ([`SunImages::near`]).
+#[derive(Clone, Debug)]
+pub struct Nearby<'a> {
+    list: List<'a>,
+    number: u32,
+    point: Vec3,
+    reach: f64,
+}
+
+/// An image of the sun, as a point sees it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Image {
+    /// Its number on its side.
+    pub number: u32,
+    /// Its direction.
+    pub axis: Vec3,
+    /// What shows it.
+    pub mirrors: Mirrors,
+}
+
+impl Iterator for Nearby<'_> {
+    type Item = Image;
+
+    fn next(&mut self) -> Option<Image> {
+        loop {
+            let (packed, region, mirrors) = self.list.next()?;
+            self.number += 1;
+            let axis = unpack(packed);
+            if region.may_meet(axis, self.point, self.reach) {
+                return Some(Image { number: self.number - 1, axis, mirrors });
+            }
+        }
+    }
+}
+
 /// The same while light is noted.
 #[derive(Debug, Default)]
 pub struct Noting<'a> {
@@ -103,6 +256,8 @@ pub struct Noting<'a> {
     pub spread: &'a mut [f32],
     /// Reference radiance, one value per band.
     pub reference: &'a [f64],
+    /// Corners of all facets.
+    pub corners: &'a [[Vec3; 3]],
 }
 
 /// Values that tell where on an element light falls: for that of lobes and curved mirrors and for that of images its sum,
@@ -137,18 +292,26 @@ pub fn variance(spread: &[f32], known: bool) -> f64 {
 const SMALLEST: f64 = 16.0;
 
 impl Noting<'_> {
-    /// Notes an image in the direction `packed` for one of `sides` sides of facets.
-    pub fn note(&mut self, sides: usize, side: usize, packed: u64) {
+    /// Notes an image in the direction `packed` for one of `sides` sides of facets, that a `mirror` shows.
+    pub fn note(&mut self, sides: usize, side: usize, packed: u64, mirror: usize) {
         let direction = unpack(packed);
+        let disc =
+            |axis: Vec3| self.corners.get(mirror).map_or(([0.0; 2], f64::INFINITY), |c| Region::of(c, axis));
         let (mut last, mut count) = (side, 0);
-        for (number, other) in List::of(self.slots, sides, side).enumerate() {
-            if 1.0 - unpack(other).dot(direction) < SAME {
+        for (number, (other, region, mirrors)) in List::of(self.slots, sides, side).enumerate() {
+            // of this image where the list goes on
+            last = sides + PLACES * ((self.slots.at(last) & NEXT) as usize) - 1;
+            let axis = unpack(other);
+            if 1.0 - axis.dot(direction) < SAME {
+                let (middle, radius) = disc(axis);
+                let next = self.slots.at(last) & NEXT;
+                self.slots.set(last, next | u64::from(region.with(middle, radius).0) << 32);
+                self.slots.set(last + 1, mirrors.with(mirror).0);
                 return;
             }
-            let place = self.slots.at(last) as usize;
-            (last, count) = (sides + 2 * place, number + 1);
+            count = number + 1;
         }
-        if self.slots.at(last) == MANY {
+        if count == 0 && self.slots.at(last) == MANY {
             return;
         }
         let used = self.slots.at(sides) as usize;
@@ -156,10 +319,12 @@ impl Noting<'_> {
             self.slots.set(side, MANY);
             return;
         }
-        let place = sides + 1 + 2 * used;
+        let (middle, radius) = disc(direction);
+        let place = sides + 1 + PLACES * used;
         self.slots.set(place, packed);
-        self.slots.set(place + 1, 0);
-        self.slots.set(last, used as u64 + 1);
+        self.slots.set(place + 1, u64::from(Region::new(middle, radius).0) << 32);
+        self.slots.set(place + 2, Mirrors::default().with(mirror).0);
+        self.slots.set(last, self.slots.at(last) & !NEXT | (used as u64 + 1));
         self.slots.set(sides, used as u64 + 1);
     }
 
@@ -220,7 +385,16 @@ impl<'a> SunImages<'a> {
     /// Directions toward the images that one of `sides` sides of facets may see.
     #[inline]
     pub fn of(&self, sides: usize, side: usize) -> impl Iterator<Item = Vec3> + use<'a> {
-        List::of(self.slots, sides, side).map(unpack)
+        List::of(self.slots, sides, side).map(|(packed, ..)| unpack(packed))
+    }
+
+    /// Those that one of `sides` sides of facets may see from within `reach` of a point, where the
+    /// light of each is spread over angles of the sine `spread`.
+    #[inline]
+    pub fn near(&self, (sides, side): (usize, usize), point: Vec3, reach: f64, spread: f64) -> Nearby<'a> {
+        // more than the tangent over the longest distance in a scene
+        let reach = reach + 2.0 * spread * LONGEST;
+        Nearby { list: List::of(self.slots, sides, side), number: 0, point, reach }
     }
 
     /// Whether [`SunImages::of`] gives all images that one of `sides` sides of facets may see; else their light stays a mean.
@@ -235,7 +409,16 @@ impl<'a> SunImages<'a> {
         if self.slots.is_empty() || !self.are_known(side) {
             return true;
         }
-        self.of(sides, side).any(|own| 1.0 - own.dot(axis) < SEEN)
+        // most differ in their bits already; at the rims of the octahedron's square, those do not tell
+        let places = |packed: u64| [packed >> BITS, packed].map(|x| (x & STEPS) as i64);
+        let near = places(pack(axis));
+        let rim = near.iter().any(|x| !(NEAR..=STEPS as i64 - NEAR).contains(x));
+        let may_be = |packed: u64| {
+            let [a, b] = places(packed);
+            rim || (a - near[0]).abs() < NEAR && (b - near[1]).abs() < NEAR
+        };
+        let mut list = List::of(self.slots, sides, side);
+        list.any(|(packed, ..)| may_be(packed) && 1.0 - unpack(packed).dot(axis) < SEEN)
     }
 
     /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.
@@ -270,19 +453,24 @@ mod tests {
     #[test]
     fn images_are_noted_once_and_too_many_are_means() {
         let sides = 3;
-        let mut slots = [0; 3 + 1 + 2 * ROOM.0];
+        let mut slots = [0; 3 + 1 + PLACES * ROOM.0];
         let mut thrown = [1.0; 3];
         assert_eq!(places(sides), slots.len());
-        let mut noting =
-            Noting { slots: &mut slots, thrown: &mut thrown, spread: &mut [], reference: &[1.0] };
+        let mut noting = Noting {
+            slots: &mut slots,
+            thrown: &mut thrown,
+            spread: &mut [],
+            reference: &[1.0],
+            corners: &[],
+        };
         for x in [0.0, 0.1, 0.1, 0.0, 0.2] {
-            noting.note(sides, 1, pack(Vec3::new(x, 0.0, 1.0).normalize()));
+            noting.note(sides, 1, pack(Vec3::new(x, 0.0, 1.0).normalize()), 0);
         }
         for x in 0..MOST + 3 {
-            noting.note(sides, 2, pack(Vec3::new(1e-3 * x as f64, 0.0, 1.0).normalize()));
-            noting.note(sides, 1, pack(Vec3::new(0.2, 0.0, 1.0).normalize()));
+            noting.note(sides, 2, pack(Vec3::new(1e-3 * x as f64, 0.0, 1.0).normalize()), 0);
+            noting.note(sides, 1, pack(Vec3::new(0.2, 0.0, 1.0).normalize()), 0);
         }
-        noting.note(sides, 1, pack(Vec3::new(0.3, 0.0, 1.0).normalize()));
+        noting.note(sides, 1, pack(Vec3::new(0.3, 0.0, 1.0).normalize()), 0);
         let shape = Shape { levels: 1, bands: 1 };
         let images = SunImages::new(&slots, &thrown, sides, sides, shape).unwrap();
         assert_eq!([0, 1, 2].map(|side| images.of(sides, side).count()), [0, 4, 0]);

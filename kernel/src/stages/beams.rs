@@ -40,6 +40,7 @@ impl Beams {
             thrown: &mut *solution.thrown,
             spread: &mut *scratch.spread,
             reference: &*solution.reference,
+            corners: scene.corners(),
         };
         if self.rows == 0 {
             images.spread.fill(0.0);

@@ -9,6 +9,7 @@ mod sunlight;
 
 use crowd::{CROWDED, Surroundings};
 pub(crate) use gather::{CAUTION, GATHERS};
+
 use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
 use straight::OpenAt;
@@ -683,10 +684,18 @@ impl Solved<'_> {
         let values =
             self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
         let sunlit = self.sun_cosine(leg, surface, how, path);
-        if !self.images.slots.is_empty() {
-            self.add_images(leg, surface, how, to, path);
-        }
-        if self.goes_on(leg, surface, unknown, how.sample) {
+        let goes_on = self.goes_on(leg, surface, unknown, how.sample);
+        let thrown: &[f64] = if leg.onward.is_some() && !goes_on {
+            // rays from a point are many, and each meets another place: what images give its element on the mean does
+            let side = surface.facet * self.scene.sides() + surface.side;
+            self.images.mean(self.shape, side, (unknown, level.min(self.shape.levels.saturating_sub(1))))
+        } else {
+            if !self.images.slots.is_empty() {
+                self.add_images(leg, surface, how, to, path);
+            }
+            &[]
+        };
+        if goes_on {
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
@@ -709,8 +718,10 @@ impl Solved<'_> {
             variance = variance.max(CROWDED * CROWDED);
         }
         let wants_rays = self.wants_rays(surface, weight, variance);
-        let open =
-            if leg.gathered.is_some() { self.open_at(surface, unknown, local, how.outlook) } else { None };
+        let open = match leg.gathered.as_deref_mut() {
+            Some(kept) => self.open_in_pixel(surface, unknown, local, &mut kept.skies, how.outlook),
+            None => None,
+        };
         if wants_rays && let Some(gathered) = leg.gathered.as_deref_mut() {
             let open = open.as_ref();
             let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors, open };
@@ -725,7 +736,7 @@ impl Solved<'_> {
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
             let mut irradiance = held(values, bands, local, open.as_ref(), band);
             irradiance = (irradiance + correction.at(band)).max(0.0);
-            irradiance += open.as_ref().map_or(0.0, |open| open.irradiance.at(band));
+            irradiance += open.as_ref().map_or(0.0, |open| open.irradiance.at(band)) + thrown.at(band);
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {

@@ -9,6 +9,7 @@
 //! Where a ray is short beside the element that it meets, the element's linear function says nothing of light there: beside
 //! contact lines, where a body is pierced by another. The ray goes on diffusely from there, as paths do, until it is not.
 
+use super::straight::KeptSkies;
 use super::{How, Leg, OpenAt, Path, SIGNS, Sample, Solved, Surroundings, Terms, held};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
@@ -66,7 +67,7 @@ const MOST_ONWARD: u32 = 8;
 const MIXED: f64 = 0.7;
 
 /// Elements of one pixel whose corrections are kept.
-const KEPT: usize = if GATHERS { 8 } else { 0 };
+pub(super) const KEPT: usize = if GATHERS { 8 } else { 0 };
 
 plain_table! {
     /// What rays from points have brought, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
@@ -95,6 +96,8 @@ plain_table! {
         pub hits: u64,
         /// How many there are.
         pub count: u64,
+        /// The straight sky at points of elements.
+        pub skies: KeptSkies,
         /// What stands about the latest element; none at first.
         pub surroundings: Surroundings,
     }
@@ -115,6 +118,7 @@ impl Gathered {
         carried: [0.0; SIGNS],
         hits: 0,
         count: 0,
+        skies: KeptSkies::ZERO,
         surroundings: Surroundings::ZERO,
     };
 
@@ -127,6 +131,7 @@ impl Gathered {
     #[inline]
     pub fn forget(&mut self) {
         self.count = 0;
+        self.skies.count = 0;
     }
 
     /// Whether no element of the pixel was mended yet.

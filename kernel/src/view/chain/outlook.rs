@@ -4,7 +4,7 @@ use super::Solved;
 use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
-use crate::radiosity::sun_image::SAME;
+use crate::radiosity::sun_image::{Image, Nearby, SAME};
 use crate::rays::bvh::HalfSpace;
 use crate::rays::outline::Candidates;
 use crate::rays::surface::{OFFSET, Surface};
@@ -55,9 +55,49 @@ plain_struct! {
     }
 }
 
+/// Images of the sun that are remembered.
+const IMAGES: usize = if cfg!(feature = "std") { 128 } else { 0 };
+
+/// Radius of the ball for whose points they are remembered, over the root of the facet's area.
+const REACH: f64 = 0.06;
+
+/// Images of the sun that may be seen from a ball about a point, of a side of a facet.
+struct Images {
+    /// Facet and side; none at first.
+    side: Option<(usize, usize)>,
+    centre: Vec3,
+    reach: f64,
+    /// How many there are; more than [`IMAGES`]: they are not remembered.
+    count: usize,
+    all: [Image; IMAGES],
+}
+
+/// Images of the sun that may be seen from a point, one after the other: those that are remembered, or any.
+pub(super) enum Walk<'a> {
+    /// The next of those that are remembered.
+    Remembered(usize),
+    /// All that the side has.
+    All(Nearby<'a>),
+}
+
+impl Walk<'_> {
+    /// The next image.
+    #[inline]
+    pub(super) fn next(&mut self, outlook: &Outlook<'_>) -> Option<Image> {
+        match self {
+            Walk::Remembered(at) => {
+                *at += 1;
+                outlook.images.all.head(outlook.images.count).get(*at - 1).copied()
+            }
+            Walk::All(nearby) => nearby.next(),
+        }
+    }
+}
+
 /// Ways asked for lately; the same answers whether they are remembered or not.
 pub struct Outlook<'m> {
     ways: &'m mut [Way],
+    images: Images,
     /// What may be outlines from points of facets.
     pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
@@ -78,12 +118,14 @@ impl<'m> Outlook<'m> {
     /// rays have this area each, and so many follow them toward the sun.
     pub fn new(ways: &'m mut [Way], parallel: bool, area: f64, sun: f64) -> Outlook<'m> {
         let least = if parallel { WORTH * area } else { 0.0 };
-        Outlook { ways, candidates: Candidates::none(), parallel, least: (least, least / sun) }
+        Outlook { ways, parallel, least: (least, least / sun), ..Outlook::none() }
     }
 
     /// No outlook: every ray is traced.
     pub fn none() -> Outlook<'m> {
-        Outlook { ways: &mut [], candidates: Candidates::none(), parallel: false, least: (0.0, 0.0) }
+        let all = [Image::default(); IMAGES];
+        let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
+        Outlook { ways: &mut [], images, candidates: Candidates::none(), parallel: false, least: (0.0, 0.0) }
     }
 
     /// The same with room for outlines.
@@ -94,6 +136,33 @@ impl<'m> Outlook<'m> {
     /// Whether first rays are parallel and ways are known.
     pub(super) fn is_parallel(&self) -> bool {
         self.parallel && !self.ways.is_empty()
+    }
+
+    /// The images of the sun that may be seen from a point of a surface.
+    pub(super) fn images<'a>(&mut self, solved: &Solved<'a>, surface: &Surface, spread: f64) -> Walk<'a> {
+        let (sides, side) =
+            (solved.elements.facet_sides(), surface.facet * solved.scene.sides() + surface.side);
+        if IMAGES == 0 {
+            return Walk::All(solved.images.near((sides, side), surface.point, 0.0, spread));
+        }
+        let images = &mut self.images;
+        let apart = surface.point - images.centre;
+        let here = Some((surface.facet, surface.side));
+        if images.side != here || apart.dot(apart) > images.reach * images.reach {
+            let reach = REACH * sqrt(solved.scene.areas().at(surface.facet));
+            (images.side, images.centre, images.reach, images.count) = (here, surface.point, reach, 0);
+            for image in solved.images.near((sides, side), surface.point, reach, spread) {
+                if images.count < IMAGES {
+                    images.all.set(images.count, image);
+                }
+                images.count += 1;
+            }
+        }
+        if images.count <= IMAGES {
+            Walk::Remembered(0)
+        } else {
+            Walk::All(solved.images.near((sides, side), surface.point, 0.0, spread))
+        }
     }
 
     /// The facets that may stand in the way of rays that leave the flat `surface`'s side along `direction`, or along any

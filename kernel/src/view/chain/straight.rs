@@ -1,7 +1,8 @@
 //! The sky that a point sees straight, by outlines, in place of what its element holds of it.
 
-use super::gather::BANDS;
+use super::gather::{BANDS, KEPT};
 use super::{Outlook, Solved, linear};
+use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::fabs;
 use crate::coupling::element::Local;
@@ -14,6 +15,30 @@ const PART: f64 = 0.25;
 /// The most by which what is blocked at a point may differ from the element's linear function, as a factor either way: beyond
 /// it nothing tells what arrives from what is blocked.
 const MOST_BLOCKED: f64 = 2.0;
+
+plain_table! {
+    /// The straight sky at the first point of some elements in one pixel.
+    pub struct KeptSkies {
+        /// Irradiance beyond the element's linear function.
+        pub beyond: [[f64; BANDS]; KEPT],
+        /// Whether it is known, and [`OpenAt::share`], [`OpenAt::ratio`] and [`OpenAt::variance`].
+        pub rest: [[f64; 4]; KEPT],
+        /// The unknowns.
+        pub unknowns: [u64; KEPT],
+        /// Elements that are kept.
+        pub count: u64,
+    }
+}
+
+impl KeptSkies {
+    /// None.
+    pub const ZERO: KeptSkies =
+        KeptSkies { beyond: [[0.0; BANDS]; KEPT], rest: [[0.0; 4]; KEPT], unknowns: [0; KEPT], count: 0 };
+
+    fn find(&self, unknown: usize) -> Option<usize> {
+        (0..(self.count as usize).min(KEPT)).find(|&at| self.unknowns.at(at) == unknown as u64)
+    }
+}
 
 /// The straight sky at a point.
 pub(super) struct OpenAt<'a> {
@@ -31,6 +56,45 @@ pub(super) struct OpenAt<'a> {
 }
 
 impl<'a> Solved<'a> {
+    /// [`Solved::open_at`] as the first point of its element in a pixel tells it: from point to point of one element in one
+    /// pixel the straight sky differs by as much as the element's linear function.
+    pub(super) fn open_in_pixel(
+        &self,
+        surface: &Surface,
+        unknown: usize,
+        local: Local,
+        kept: &mut KeptSkies,
+        outlook: &mut Outlook<'_>,
+    ) -> Option<OpenAt<'a>> {
+        let bands = self.shape.bands.min(BANDS);
+        if let Some(place) = kept.find(unknown) {
+            let (held, _) = self.straight.of(unknown, bands)?;
+            let [known, share, ratio, variance] = kept.rest.at(place);
+            let mut irradiance = kept.beyond.get(place).copied()?;
+            for (band, value) in irradiance.iter_mut().enumerate().take(bands) {
+                *value = (*value + linear(held, bands, local, band)).max(0.0);
+            }
+            return (known > 0.0).then_some(OpenAt { irradiance, held, share, ratio, variance });
+        }
+        let open = self.open_at(surface, unknown, local, outlook);
+        let place = kept.count as usize;
+        if place < KEPT {
+            kept.unknowns.set(place, unknown as u64);
+            kept.count += 1;
+            let Some(open) = &open else {
+                kept.rest.set(place, [0.0; 4]);
+                return None;
+            };
+            kept.rest.set(place, [1.0, open.share, open.ratio, open.variance]);
+            if let Some(beyond) = kept.beyond.get_mut(place) {
+                for (band, (to, value)) in beyond.iter_mut().zip(&open.irradiance).enumerate().take(bands) {
+                    *to = value - linear(open.held, bands, local, band);
+                }
+            }
+        }
+        open
+    }
+
     /// The straight sky at a point. `None` where outlines do not tell it, or what is blocked there is far from what the
     /// element's linear function says.
     #[inline(never)]

@@ -1,12 +1,12 @@
 //! Sunlight on a point that a chain meets: straight, mirrored by flat facets, and in lobes.
 
 use super::outlook::{Toward, may_meet};
-use super::{How, Leg, Path, Sample, Solved, Terms};
+use super::{How, Leg, Outlook, Path, Sample, Solved, Terms};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::word::LONGEST;
-use crate::radiosity::sun_image::SAME;
+use crate::radiosity::sun_image::{Image, SAME};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
 use crate::scene::lobe::{Highlight, Lobe};
@@ -155,17 +155,17 @@ impl Solved<'_> {
         path: &mut Path,
     ) {
         let Some(sun) = &self.light.sun else { return };
-        let (sides, bands) = (self.scene.sides(), self.shape.bands);
-        let side = surface.facet * sides + surface.side;
+        let bands = self.shape.bands;
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors + 1));
-        for (n, axis) in (0..).zip(self.images.of(self.elements.facet_sides(), side)) {
+        let mut images = how.outlook.images(self, surface, sun.half_angle());
+        while let Some(one) = images.next(how.outlook) {
+            let axis = one.axis;
             let image = sun.seen_toward(axis);
             let cosine = image.cosine(surface.normal);
             if cosine <= 0.0 {
                 continue;
             }
-            let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
-            if known.is_some_and(|mirrors| !self.any_may_show(mirrors, surface.point, axis, sun)) {
+            if !self.may_show(&one, surface, sun, how.outlook) {
                 continue;
             }
             let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
@@ -185,12 +185,17 @@ impl Solved<'_> {
         }
     }
 
-    /// Whether any of these mirrors may show a point the sun whose middle seems to stand in the direction `axis`.
+    /// Whether any mirror may show a point an image of the sun.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
-    fn any_may_show(&self, mirrors: &[u32], point: Vec3, axis: Vec3, sun: &Sun<'_>) -> bool {
-        mirrors
-            .iter()
-            .any(|&facet| may_meet(&self.scene.corners().at(facet as usize), point, axis, sun.half_angle()))
+    fn may_show(&self, image: &Image, surface: &Surface, sun: &Sun<'_>, outlook: &mut Outlook<'_>) -> bool {
+        let axis = image.axis;
+        let shows =
+            |facet: usize| may_meet(&self.scene.corners().at(facet), surface.point, axis, sun.half_angle());
+        if let Some(mut all) = image.mirrors.all() {
+            return all.any(shows);
+        }
+        let known = outlook.before(self, surface, Toward::Image(image.number), (axis, sun.half_angle()));
+        known.is_none_or(|mirrors| mirrors.iter().any(|facet| shows(*facet as usize)))
     }
 
     /// Adds what an image of the sun brings, of whose disc `leg.images` holds the lit share of `all`.
@@ -282,15 +287,15 @@ impl Solved<'_> {
             self.add_highlight(leg, (sun, value, all), terms);
             self.glare(leg, lobe, (value, at_stake), path);
         }
-        let side = surface.facet * self.scene.sides() + surface.side;
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors));
-        for (n, axis) in (0..).zip(self.images.of(self.elements.facet_sides(), side)) {
+        let mut images = how.outlook.images(self, surface, sun.half_angle());
+        while let Some(one) = images.next(how.outlook) {
+            let axis = one.axis;
             let image = sun.seen_toward(axis);
             if !shows(&image) {
                 continue;
             }
-            let known = how.outlook.before(self, surface, Toward::Image(n), (axis, sun.half_angle()));
-            if known.is_some_and(|mirrors| !self.any_may_show(mirrors, surface.point, axis, sun)) {
+            if !self.may_show(&one, surface, sun, how.outlook) {
                 continue;
             }
             let [lit, products] = &mut *leg.images;
