@@ -11,7 +11,7 @@
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces, span};
-use crate::base::math::narrow;
+use crate::base::math::{fabs, narrow};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::word::EMPTY;
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
@@ -94,8 +94,12 @@ impl LaneTask for Differences<'_, '_> {
         for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
             sums.fill([0.0; 4]);
             add_targets(&row, radiance, sums);
+            let known = system.straight.knows(unknown);
             if let Some(sky) = &system.light.sky {
-                add_sky(&row, (sky, system.straight.knows(unknown)), lanes, light, sums);
+                add_sky(&row, (sky, known), lanes, light, sums);
+            }
+            if known {
+                about_mean(system, unknown, &row, radiance, lanes, light, sums);
             }
             for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
                 let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
@@ -176,6 +180,50 @@ fn is_dark(system: &System<'_>) -> bool {
 
 fn check(given: usize, expected: usize) -> Result<(), Error> {
     if given == expected { Ok(()) } else { Err(Error::Length { what: "errors", expected, given }) }
+}
+
+/// Difference of a row's blocked share from that of its targets that are met first, up to which each of its rays that meet
+/// anything has one.
+const ONE_EACH: f64 = 1e-6;
+
+/// Takes the mean of what is met off a row's checks, where outlines tell how much is met: its entries are multiplied so
+/// that they fill it, and their halves differ by what differs from the mean alone.
+#[inline(always)]
+fn about_mean<L: Lanes>(
+    system: &System<'_>,
+    unknown: usize,
+    row: &RowView<'_>,
+    radiance: &[f64],
+    lanes: L,
+    light: &mut [f64],
+    sums: &mut [[f64; 4]],
+) {
+    let bands = sums.len();
+    let (mut met, mut checks) = (0.0, [0.0; 4]);
+    for record in row.targets.iter().filter(|record| record.word() == EMPTY) {
+        met += record.weight;
+        checks.iter_mut().zip(record.checks).for_each(|(sum, c)| *sum += f64::from(c));
+    }
+    if met <= 0.0 || fabs(met - row.row.blocked) > ONE_EACH {
+        return;
+    }
+    let mut means = [0.0; MAX_BANDS];
+    for record in row.targets {
+        let start = record.unknown() * bands;
+        let seen = radiance.part(start..start + bands).iter().zip(row.products(record.word()));
+        means.iter_mut().zip(seen).for_each(|(mean, (l, p))| *mean += record.weight * l * p);
+    }
+    if let Some(sky) = &system.light.sky {
+        for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.word, BLOCKED | EMPTY)) {
+            sky.sum(lanes, bundle.packed, light);
+            let seen = light.iter().zip(row.products(bundle.word));
+            means.iter_mut().zip(seen).for_each(|(mean, (l, p))| *mean += bundle.weight * l * p);
+        }
+    }
+    let scale = system.straight.scale(unknown, bands, &row.row);
+    for (sums, mean) in sums.iter_mut().zip(means) {
+        sums.iter_mut().zip(checks).for_each(|(sum, c)| *sum = scale * (*sum - mean / met * c));
+    }
 }
 
 /// Adds a row's checks, each times the light it stands for, by band.
