@@ -28,7 +28,7 @@ use crate::scene::{MAX_BANDS, Scene};
 use crate::settings::{self, Settings};
 
 /// Version of the layout; another one is refused.
-pub const VERSION: u64 = 4;
+pub const VERSION: u64 = 5;
 
 /// "BLIKBAKE"; its bytes tell the byte order.
 const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");

@@ -23,12 +23,20 @@ const COARSE: f64 = 3.0;
 /// The most of it: coarser elements tell nothing.
 const COARSEST: f64 = 0.02;
 
+/// An image's tolerance below which its first solution's goes with its power of 3/4 alone: rays of rows go with the power
+/// -1.5 of theirs and more elements have them, rays from points with the power -1.3 of the image's.
+const FINE_IMAGE: f64 = 2e-3;
+
 /// Estimates of a part of an image are worse than of all by less than this factor.
 const PART: f64 = 1.15;
 
 /// The tolerance of the solution of an image's first round.
 pub fn first(asked: f64) -> f64 {
-    if GATHERS { asked.max(COARSEST.min(COARSE * asked)) } else { asked }
+    if GATHERS {
+        asked.max(COARSEST.min(COARSE * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)))
+    } else {
+        asked
+    }
 }
 
 /// One round of an image.

@@ -136,7 +136,7 @@ int main() {
     const double begin = 1e-3;
 #else
     const double worse = 1;
-    const double begin = 3e-3; // rays from the image's points do the rest
+    const double begin = 3.0 * 1e-3 * std::sqrt(std::sqrt(2e-3 / 1e-3)); // rays from the image's points do the rest
 #endif
     REQUIRE(rounds.back().error_estimate <= worse * rounds[0].error_estimate);
     // a solution as coarse as before, and rays from the image's points

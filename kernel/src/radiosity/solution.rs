@@ -47,6 +47,9 @@ plain_struct! {
         /// Bound on the distance of the radiances from the solution of the discrete system, relative to the reference
         /// radiance.
         pub solver: f64,
+        /// Mean irradiance over pi of the elements whose straight sky is known, by all else, relative to the reference
+        /// radiance in its brightest band; 1 where none is known.
+        pub reflected: f64,
         /// Sweeps done.
         pub sweeps: u64,
         /// Rays toward the sun and from mirrors that face it.

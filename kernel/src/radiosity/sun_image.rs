@@ -147,7 +147,7 @@ impl Region {
         if apart + radius <= own_radius {
             return self;
         }
-        if !(own_radius < f64::INFINITY) {
+        if own_radius == f64::INFINITY {
             return self;
         }
         let both = 0.5 * (apart + radius + own_radius).max(2.0 * radius);

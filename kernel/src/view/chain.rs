@@ -51,21 +51,24 @@ pub struct ChainSettings {
 /// Lobes of this axis ratio and above are narrow: cells of a signature may miss their highlights.
 pub const APART: f64 = 10.0;
 
-/// [`ChainSettings::gather`] where all pixels of an image may take rays: what elements tell of their own errors is too little
-/// beside steps and slits.
-const GATHER_ALL: f64 = 0.1;
+/// [`ChainSettings::gather`] where all pixels of an image may take rays and the solution is coarser than the image.
+const GATHER_ALL: f64 = 0.25;
+
+/// Rays that an image may take in any case: some tenths of a second.
+const AT_LEAST: f64 = 2e6;
 
 /// The same where the solution is as fine as the image.
 const GATHER_MANY: f64 = 0.6;
 
 impl ChainSettings {
     /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
-    /// elements are mended.
-    pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>) -> ChainSettings {
+    /// elements are mended. `reflected` is [`crate::radiosity::solution::Numbers::reflected`].
+    pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>, reflected: f64) -> ChainSettings {
         let ErrorBudget { solution, image, .. } = self.budget;
         let all = camera.columns() * camera.rows();
-        let each = gather::usual_rays(image / scene.largest_diffuse().max(f64::MIN_POSITIVE));
-        let affords = |pixels: f64| pixels * each <= self.rays as f64;
+        let spread = scene.largest_diffuse() * gather::spread(reflected);
+        let each = gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::FEWEST.0);
+        let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(AT_LEAST);
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
         let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
@@ -717,22 +720,24 @@ impl Solved<'_> {
         {
             variance = variance.max(CROWDED * CROWDED);
         }
-        let wants_rays = self.wants_rays(surface, weight, variance);
         let open = match leg.gathered.as_deref_mut() {
             Some(kept) => self.open_in_pixel(surface, unknown, local, &mut kept.skies, how.outlook),
             None => None,
         };
-        if wants_rays && let Some(gathered) = leg.gathered.as_deref_mut() {
+        variance += match &open {
+            Some(_) => 0.0,
+            None => self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance),
+        };
+        if self.wants_rays(surface, weight, variance)
+            && let Some(gathered) = leg.gathered.as_deref_mut()
+        {
             let open = open.as_ref();
             let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors, open };
             if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
                 (correction, variance) = (near, left);
             }
         }
-        variance += match &open {
-            Some(open) => open.variance,
-            None => self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance),
-        };
+        variance += open.as_ref().map_or(0.0, |open| open.variance);
         for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
             let mut irradiance = held(values, bands, local, open.as_ref(), band);
             irradiance = (irradiance + correction.at(band)).max(0.0);
@@ -754,8 +759,8 @@ impl Solved<'_> {
     }
 }
 
-/// Sets of signs of the errors of elements.
-pub(crate) const SIGNS: usize = 4;
+/// Sets of signs of the errors of elements; all have the same sign in the last.
+pub(crate) const SIGNS: usize = 5;
 
 /// The sign of an unknown's error in one of the sets: errors of different elements are independent, so that squares of sums
 /// with such signs are what their sum's square is expected to be.
@@ -763,7 +768,8 @@ pub(crate) const SIGNS: usize = 4;
 fn sign(unknown: usize, set: usize) -> f64 {
     // the upper bits of a product with the golden ratio are as good as random
     let bits = (unknown as u32).wrapping_mul(0x9e37_79b9);
-    if (bits ^ (bits >> 15)).wrapping_mul(0x85eb_ca6b) >> (24 + set) & 1 == 1 { -1.0 } else { 1.0 }
+    let odd = (bits ^ (bits >> 15)).wrapping_mul(0x85eb_ca6b) >> (24 + set) & 1 == 1;
+    if odd && set + 1 < SIGNS { -1.0 } else { 1.0 }
 }
 
 /// Irradiance of one band by an element's mean and gradients (`values`) at a point in its local coordinates, less what they

@@ -168,7 +168,7 @@ pub fn rows(
             return Err(Error::Length { what: "image component", expected, given: component.len() });
         }
     }
-    let settings = solved.settings.of_image(camera, solved.scene);
+    let settings = solved.settings.of_image(camera, solved.scene, solved.numbers.reflected);
     let solved = &Solved { settings, ..*solved };
     let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
     let width = camera.columns() + 2;

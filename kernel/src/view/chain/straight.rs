@@ -4,7 +4,7 @@ use super::gather::{BANDS, KEPT};
 use super::{Outlook, Solved, linear};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
-use crate::base::math::fabs;
+use crate::base::math::{clamp, fabs};
 use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
@@ -21,8 +21,8 @@ plain_table! {
     pub struct KeptSkies {
         /// Irradiance beyond the element's linear function.
         pub beyond: [[f64; BANDS]; KEPT],
-        /// Whether it is known, and [`OpenAt::share`], [`OpenAt::ratio`] and [`OpenAt::variance`].
-        pub rest: [[f64; 4]; KEPT],
+        /// Whether it is known, what is blocked beyond the element's linear function, and [`OpenAt::variance`].
+        pub rest: [[f64; 3]; KEPT],
         /// The unknowns.
         pub unknowns: [u64; KEPT],
         /// Elements that are kept.
@@ -33,7 +33,7 @@ plain_table! {
 impl KeptSkies {
     /// None.
     pub const ZERO: KeptSkies =
-        KeptSkies { beyond: [[0.0; BANDS]; KEPT], rest: [[0.0; 4]; KEPT], unknowns: [0; KEPT], count: 0 };
+        KeptSkies { beyond: [[0.0; BANDS]; KEPT], rest: [[0.0; 3]; KEPT], unknowns: [0; KEPT], count: 0 };
 
     fn find(&self, unknown: usize) -> Option<usize> {
         (0..(self.count as usize).min(KEPT)).find(|&at| self.unknowns.at(at) == unknown as u64)
@@ -69,12 +69,22 @@ impl<'a> Solved<'a> {
         let bands = self.shape.bands.min(BANDS);
         if let Some(place) = kept.find(unknown) {
             let (held, _) = self.straight.of(unknown, bands)?;
-            let [known, share, ratio, variance] = kept.rest.at(place);
+            let [known, beyond, variance] = kept.rest.at(place);
             let mut irradiance = kept.beyond.get(place).copied()?;
             for (band, value) in irradiance.iter_mut().enumerate().take(bands) {
                 *value = (*value + linear(held, bands, local, band)).max(0.0);
             }
-            return (known > 0.0).then_some(OpenAt { irradiance, held, share, ratio, variance });
+            // what is blocked goes with it, so that both fill the hemisphere
+            let by_element = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
+            let blocked = clamp(beyond + by_element, 0.0, 1.0);
+            let ratio = ratio(blocked, by_element)?;
+            return (known > 0.0).then_some(OpenAt {
+                irradiance,
+                held,
+                share: 1.0 - blocked,
+                ratio,
+                variance,
+            });
         }
         let open = self.open_at(surface, unknown, local, outlook);
         let place = kept.count as usize;
@@ -82,10 +92,11 @@ impl<'a> Solved<'a> {
             kept.unknowns.set(place, unknown as u64);
             kept.count += 1;
             let Some(open) = &open else {
-                kept.rest.set(place, [0.0; 4]);
+                kept.rest.set(place, [0.0; 3]);
                 return None;
             };
-            kept.rest.set(place, [1.0, open.share, open.ratio, open.variance]);
+            let by_element = linear(open.held.part(3 * bands..3 * bands + 3), 1, local, 0);
+            kept.rest.set(place, [1.0, 1.0 - open.share - by_element, open.variance]);
             if let Some(beyond) = kept.beyond.get_mut(place) {
                 for (band, (to, value)) in beyond.iter_mut().zip(&open.irradiance).enumerate().take(bands) {
                     *to = value - linear(open.held, bands, local, band);
@@ -123,11 +134,15 @@ impl<'a> Solved<'a> {
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
         let share = open.values[0];
         let blocked = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
-        let same = fabs(1.0 - share - blocked) < straight::SAME;
-        let ratio = if same { 1.0 } else { (1.0 - share) / blocked };
-        if !(1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio) {
-            return None;
-        }
+        let ratio = ratio(1.0 - share, blocked)?;
         Some(OpenAt { irradiance, held, share, ratio, variance: open.error * open.error })
     }
+}
+
+/// By what all else that arrives counts where this share of the hemisphere is blocked, beside that by an element's linear
+/// function; `None` where they are far apart.
+fn ratio(blocked: f64, by_element: f64) -> Option<f64> {
+    let same = fabs(blocked - by_element) < straight::SAME;
+    let ratio = if same { 1.0 } else { blocked / by_element };
+    (1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio).then_some(ratio)
 }
