@@ -52,7 +52,7 @@ pub struct ChainSettings {
 pub const APART: f64 = 10.0;
 
 /// [`ChainSettings::gather`] where all pixels of an image may take rays and the solution is coarser than the image.
-const GATHER_ALL: f64 = 0.25;
+const GATHER_ALL: f64 = 0.5;
 
 /// Rays that an image may take in any case: some tenths of a second.
 const AT_LEAST: f64 = 2e6;
@@ -720,14 +720,13 @@ impl Solved<'_> {
         {
             variance = variance.max(CROWDED * CROWDED);
         }
+        let by_element = self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance);
+        let looks = self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element);
         let open = match leg.gathered.as_deref_mut() {
-            Some(kept) => self.open_in_pixel(surface, unknown, local, &mut kept.skies, how.outlook),
-            None => None,
+            Some(kept) if looks => self.open_in_pixel(surface, unknown, local, &mut kept.skies, how.outlook),
+            _ => None,
         };
-        variance += match &open {
-            Some(_) => 0.0,
-            None => self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance),
-        };
+        variance += if open.is_some() { 0.0 } else { by_element };
         if self.wants_rays(surface, weight, variance)
             && let Some(gathered) = leg.gathered.as_deref_mut()
         {

@@ -12,6 +12,9 @@ use crate::rays::surface::Surface;
 /// Part of the tolerance that circles may leave at a point.
 const PART: f64 = 0.25;
 
+/// Part of the tolerance that an element's linear function may leave of the straight sky at a point.
+const LOOK: f64 = 0.25;
+
 /// The most by which what is blocked at a point may differ from the element's linear function, as a factor either way: beyond
 /// it nothing tells what arrives from what is blocked.
 const MOST_BLOCKED: f64 = 2.0;
@@ -104,6 +107,13 @@ impl<'a> Solved<'a> {
             }
         }
         open
+    }
+
+    /// Whether the linear function over an element of this expected squared error is too little for a point of such a weight.
+    #[inline]
+    pub(super) fn wants_look(&self, weight: f64, variance: f64) -> bool {
+        let most = LOOK * self.settings.budget.image;
+        weight * weight * variance > most * most
     }
 
     /// The straight sky at a point. `None` where outlines do not tell it, or what is blocked there is far from what the
