@@ -44,8 +44,8 @@ fn band(case: &Case, band: usize) -> Case {
 /// What rays from a point leave of a pixel's error, in tolerances: three times their rms error of 0.55.
 const POINT: f64 = 3.0 * 0.55;
 
-/// Of rays from the image's points all bands share those that the worst asks for, too. Other rays change a pixel by up to
-/// the error that they leave; most pixels take the same in all bands.
+/// Of looks at the sky and rays from the image's points all bands share those that the worst asks for, too. Others change a pixel by up to
+/// the error that they leave; three pixels in four take the same in all bands.
 #[track_caller]
 fn are_alike(three: impl Iterator<Item = f32>, single: &[f32], most: f64, equal: impl Fn(f32, f32) -> bool) {
     let mut same = 0;
@@ -53,7 +53,7 @@ fn are_alike(three: impl Iterator<Item = f32>, single: &[f32], most: f64, equal:
         same += usize::from(equal(three, single));
         assert!(f64::from((three - single).abs()) <= most, "{three} {single}");
     }
-    assert!(same * 10 >= single.len() * 9, "{same} of {} pixels take the same rays", single.len());
+    assert!(same * 4 >= single.len() * 3, "{same} of {} pixels take the same rays", single.len());
 }
 
 /// Centre samples: where areas are sampled, all bands share the rays that the worst asks for.

@@ -52,7 +52,7 @@ pub struct ChainSettings {
 pub const APART: f64 = 10.0;
 
 /// [`ChainSettings::gather`] where all pixels of an image may take rays and the solution is coarser than the image.
-const GATHER_ALL: f64 = 0.5;
+const GATHER_ALL: f64 = 0.3;
 
 /// Rays that an image may take in any case: some tenths of a second.
 const AT_LEAST: f64 = 2e6;
