@@ -106,7 +106,8 @@ fn cpp_programs_run_as_every_standard() {
     // two at once: they are the last of these tests to end
     for pair in [["interface.cpp", "owners.cpp"], ["arrays.cpp", "callbacks.cpp"]] {
         std::thread::scope(|scope| {
-            pair.map(|program| scope.spawn(move || run_all(program))).map(|thread| thread.join().unwrap());
+            let running = pair.map(|program| scope.spawn(move || run_all(program)));
+            running.into_iter().for_each(|thread| thread.join().unwrap());
         });
     }
 }
