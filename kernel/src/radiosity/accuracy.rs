@@ -208,11 +208,7 @@ fn about_mean<L: Lanes>(
         return;
     }
     let mut means = [0.0; MAX_BANDS];
-    for record in row.targets {
-        let start = record.unknown() * bands;
-        let seen = radiance.part(start..start + bands).iter().zip(row.products(record.word()));
-        means.iter_mut().zip(seen).for_each(|(mean, (l, p))| *mean += record.weight * l * p);
-    }
+    row.gather(radiance, means.head_mut(bands));
     if let Some(sky) = &system.light.sky {
         for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.word, BLOCKED | EMPTY)) {
             sky.sum(lanes, bundle.packed, light);

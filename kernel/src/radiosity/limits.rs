@@ -1,10 +1,6 @@
 //! What no derived radiance may exceed, and the largest that a ray can see.
 
 use crate::base::error::{Error, Field};
-use crate::base::index::Index;
-use crate::base::math::PI;
-use crate::radiosity::direct::Shape;
-use crate::radiosity::straight::Straight;
 use crate::scene::light::Light;
 use crate::scene::lobe::Lobe;
 use crate::scene::sky::LARGEST;
@@ -65,19 +61,4 @@ pub fn brightest(scene: &Scene<'_>, light: &Light<'_>, reference: &[f64], radian
 /// Largest ratio over the bands that have a reference.
 fn relative(values: &[f64], reference: &[f64]) -> f64 {
     values.iter().zip(reference).filter(|(_, r)| **r > 0.0).map(|(v, r)| v / r).fold(0.0, f64::max)
-}
-
-/// [`crate::radiosity::solution::Numbers::reflected`] of a gathered table.
-pub fn reflected(straight: &Straight<'_>, shape: Shape, reference: &[f64], irradiance: &[f64]) -> f64 {
-    let bands = shape.bands;
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (unknown, values) in irradiance.chunks(shape.stride().max(1)).enumerate() {
-        let Some((sky, _)) = straight.of(unknown, bands) else { continue };
-        let of = |(band, reference): (usize, &f64)| {
-            if *reference > 0.0 { (values.at(band) - sky.at(band)).max(0.0) / (PI * reference) } else { 0.0 }
-        };
-        sum += reference.iter().enumerate().map(of).fold(0.0, f64::max);
-        count += 1.0;
-    }
-    if count > 0.0 { sum / count } else { 1.0 }
 }

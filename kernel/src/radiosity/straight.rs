@@ -109,6 +109,21 @@ impl<'a> Straight<'a> {
         Some(([mean, a, b], short))
     }
 
+    /// [`crate::radiosity::solution::Numbers::reflected`] of a gathered table of `stride` values an unknown.
+    pub fn reflected(&self, stride: usize, reference: &[f64], irradiance: &[f64]) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (unknown, values) in irradiance.chunks(stride.max(1)).enumerate() {
+            let Some((sky, _)) = self.of(unknown, reference.len()) else { continue };
+            let bands = reference.iter().enumerate().filter(|(_, reference)| **reference > 0.0);
+            let of = |(band, reference): (usize, &f64)| {
+                (values.at(band) - sky.at(band)).max(0.0) / (PI * reference)
+            };
+            sum += bands.map(of).fold(0.0, f64::max);
+            count += 1.0;
+        }
+        if count > 0.0 { sum / count } else { 1.0 }
+    }
+
     /// Whether outlines tell an unknown's straight sky.
     #[inline]
     pub fn knows(&self, unknown: usize) -> bool {

@@ -25,12 +25,12 @@ fn room(sides: usize) -> usize {
 }
 
 /// Places of one image: its direction; where the list goes on, and its [`Region`]; its [`Mirrors`].
-const PLACES: usize = 3;
+const IMAGE_PLACES: usize = 3;
 
 /// Places for the images of `sides` sides of facets: where each side's list begins, how many images there are, and the
 /// images.
 pub fn places(sides: usize) -> usize {
-    sides.saturating_add(1).saturating_add(room(sides).saturating_mul(PLACES))
+    sides.saturating_add(1).saturating_add(room(sides).saturating_mul(IMAGE_PLACES))
 }
 
 /// The facets that show an image: one or two, each counted from 1, or more than those.
@@ -57,7 +57,7 @@ impl Mirrors {
     }
 
     fn both(self) -> [u64; 2] {
-        [self.0 & NEXT, self.0 >> 32]
+        [self.0 & NEXT_MASK, self.0 >> 32]
     }
 
     /// The facets; `None` where there are more than two.
@@ -93,16 +93,16 @@ impl Iterator for List<'_> {
 
     #[inline]
     fn next(&mut self) -> Option<(u64, Region, Mirrors)> {
-        let place = self.sides + 1 + PLACES * (self.next as usize).checked_sub(1)?;
+        let place = self.sides + 1 + IMAGE_PLACES * (self.next as usize).checked_sub(1)?;
         self.left = self.left.checked_sub(1)?;
-        let &[packed, next, mirrors] = self.slots.get(place..place + PLACES)? else { return None };
-        self.next = next & NEXT;
+        let &[packed, next, mirrors] = self.slots.get(place..place + IMAGE_PLACES)? else { return None };
+        self.next = next & NEXT_MASK;
         Some((packed, Region((next >> 32) as u32), Mirrors(mirrors)))
     }
 }
 
 /// Where a list goes on, beside the region of the image before.
-const NEXT: u64 = u32::MAX as u64;
+const NEXT_MASK: u64 = u32::MAX as u64;
 
 /// Where the mirrors stand that show an image: a disc across its direction, in coordinates of [`frame`] in steps of
 /// [`Region::STEP`]. Both of the middle's have 11 bits, the radius, rounded up, 10.
@@ -144,10 +144,7 @@ impl Region {
     fn with(self, middle: [f64; 2], radius: f64) -> Region {
         let (own, own_radius) = self.disc();
         let apart = distance(own, middle);
-        if apart + radius <= own_radius {
-            return self;
-        }
-        if own_radius == f64::INFINITY {
+        if own_radius == f64::INFINITY || apart + radius <= own_radius {
             return self;
         }
         let both = 0.5 * (apart + radius + own_radius).max(2.0 * radius);
@@ -179,16 +176,16 @@ pub const SAME: f64 = 1e-14;
 const SEEN: f64 = 2.0 * SAME;
 
 /// Longest distance between two points of a scene, at most, in scene coordinates.
-const LONGEST: f64 = 4.0;
+const SCENE_DIAMETER: f64 = 4.0;
 
 /// Bits of each coordinate of a direction.
 const BITS: u32 = 31;
 
 /// The largest coordinate.
-const STEPS: u64 = (1 << BITS) - 1;
+const LAST_STEP: u64 = (1 << BITS) - 1;
 
 /// Directions within [`SEEN`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
-const NEAR: i64 = 512;
+const NEAR_STEPS: i64 = 512;
 
 /// A direction in 63 bits, to 2e-9 rad; never 0.
 pub fn pack(direction: Vec3) -> u64 {
@@ -300,11 +297,11 @@ impl Noting<'_> {
         let (mut last, mut count) = (side, 0);
         for (number, (other, region, mirrors)) in List::of(self.slots, sides, side).enumerate() {
             // of this image where the list goes on
-            last = sides + PLACES * ((self.slots.at(last) & NEXT) as usize) - 1;
+            last = sides + IMAGE_PLACES * ((self.slots.at(last) & NEXT_MASK) as usize) - 1;
             let axis = unpack(other);
             if 1.0 - axis.dot(direction) < SAME {
                 let (middle, radius) = disc(axis);
-                let next = self.slots.at(last) & NEXT;
+                let next = self.slots.at(last) & NEXT_MASK;
                 self.slots.set(last, next | u64::from(region.with(middle, radius).0) << 32);
                 self.slots.set(last + 1, mirrors.with(mirror).0);
                 return;
@@ -320,11 +317,11 @@ impl Noting<'_> {
             return;
         }
         let (middle, radius) = disc(direction);
-        let place = sides + 1 + PLACES * used;
+        let place = sides + 1 + IMAGE_PLACES * used;
         self.slots.set(place, packed);
         self.slots.set(place + 1, u64::from(Region::new(middle, radius).0) << 32);
         self.slots.set(place + 2, Mirrors::default().with(mirror).0);
-        self.slots.set(last, self.slots.at(last) & !NEXT | (used as u64 + 1));
+        self.slots.set(last, self.slots.at(last) & !NEXT_MASK | (used as u64 + 1));
         self.slots.set(sides, used as u64 + 1);
     }
 
@@ -393,7 +390,7 @@ impl<'a> SunImages<'a> {
     #[inline]
     pub fn near(&self, (sides, side): (usize, usize), point: Vec3, reach: f64, spread: f64) -> Nearby<'a> {
         // more than the tangent over the longest distance in a scene
-        let reach = reach + 2.0 * spread * LONGEST;
+        let reach = reach + 2.0 * spread * SCENE_DIAMETER;
         Nearby { list: List::of(self.slots, sides, side), number: 0, point, reach }
     }
 
@@ -410,12 +407,12 @@ impl<'a> SunImages<'a> {
             return true;
         }
         // most differ in their bits already; at the rims of the octahedron's square, those do not tell
-        let places = |packed: u64| [packed >> BITS, packed].map(|x| (x & STEPS) as i64);
+        let places = |packed: u64| [packed >> BITS, packed].map(|x| (x & LAST_STEP) as i64);
         let near = places(pack(axis));
-        let rim = near.iter().any(|x| !(NEAR..=STEPS as i64 - NEAR).contains(x));
+        let rim = near.iter().any(|x| !(NEAR_STEPS..=LAST_STEP as i64 - NEAR_STEPS).contains(x));
         let may_be = |packed: u64| {
             let [a, b] = places(packed);
-            rim || (a - near[0]).abs() < NEAR && (b - near[1]).abs() < NEAR
+            rim || (a - near[0]).abs() < NEAR_STEPS && (b - near[1]).abs() < NEAR_STEPS
         };
         let mut list = List::of(self.slots, sides, side);
         list.any(|(packed, ..)| may_be(packed) && 1.0 - unpack(packed).dot(axis) < SEEN)
@@ -453,7 +450,7 @@ mod tests {
     #[test]
     fn images_are_noted_once_and_too_many_are_means() {
         let sides = 3;
-        let mut slots = [0; 3 + 1 + PLACES * ROOM.0];
+        let mut slots = [0; 3 + 1 + IMAGE_PLACES * ROOM.0];
         let mut thrown = [1.0; 3];
         assert_eq!(places(sides), slots.len());
         let mut noting = Noting {

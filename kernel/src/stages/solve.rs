@@ -69,9 +69,8 @@ pub(super) fn solve<'m, X: Executor>(
         let known = images.are_known(elements.facet_side(unknown));
         *variance += narrow(sun_image::variance(spread, known));
     }
-    let seen = Straight { values: straight, variance: straight_variance };
     let numbers = Numbers {
-        reflected: limits::reflected(&seen, shape, reference, irradiance),
+        reflected: seen.reflected(shape.stride(), reference, irradiance),
         brightest: limits::brightest(scene, light, reference, radiance),
         solver: sweeps.map_or(0.0, |s| s.error),
         sweeps: sweeps.map_or(shape.levels as u64, |s| u64::from(before + s.done)),

@@ -9,7 +9,6 @@ mod sunlight;
 
 use crowd::{CROWDED, Surroundings};
 pub(crate) use gather::{CAUTION, GATHERS};
-
 use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
 use straight::OpenAt;
@@ -54,11 +53,11 @@ pub const APART: f64 = 10.0;
 /// [`ChainSettings::gather`] where all pixels of an image may take rays and the solution is coarser than the image.
 const GATHER_ALL: f64 = 0.3;
 
-/// Rays that an image may take in any case: some tenths of a second.
-const AT_LEAST: f64 = 2e6;
-
 /// The same where the solution is as fine as the image.
 const GATHER_MANY: f64 = 0.6;
+
+/// Rays that an image may take in any case: some tenths of a second.
+const AT_LEAST: f64 = 2e6;
 
 impl ChainSettings {
     /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
@@ -684,14 +683,14 @@ impl Solved<'_> {
             return;
         }
         let (unknown, local) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
-        let values =
-            self.irradiance.part(self.shape.at(unknown, level.min(self.shape.levels.saturating_sub(1))));
+        let level = level.min(self.shape.levels.saturating_sub(1));
+        let values = self.irradiance.part(self.shape.at(unknown, level));
         let sunlit = self.sun_cosine(leg, surface, how, path);
         let goes_on = self.goes_on(leg, surface, unknown, how.sample);
         let thrown: &[f64] = if leg.onward.is_some() && !goes_on {
             // rays from a point are many, and each meets another place: what images give its element on the mean does
             let side = surface.facet * self.scene.sides() + surface.side;
-            self.images.mean(self.shape, side, (unknown, level.min(self.shape.levels.saturating_sub(1))))
+            self.images.mean(self.shape, side, (unknown, level))
         } else {
             if !self.images.slots.is_empty() {
                 self.add_images(leg, surface, how, to, path);

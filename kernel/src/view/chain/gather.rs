@@ -71,7 +71,7 @@ const MIXED: f64 = 0.7;
 
 /// The same over the square of the mean of expected errors: linear functions over coarse elements leave out alike in a
 /// cavity. In nested boxes of 378 elements it is 0.7, in fins and stairs 0.2 to 0.4.
-const ALIKE: f64 = 0.4;
+const COHERENT: f64 = 0.4;
 
 /// Elements of one pixel whose corrections are kept.
 pub(super) const KEPT: usize = if GATHERS { 8 } else { 0 };
@@ -149,7 +149,7 @@ impl Gathered {
 
     /// Where the correction of an unknown stands.
     fn find(&self, unknown: usize) -> Option<usize> {
-        (0..(self.count as usize).min(KEPT)).find(|&at| self.unknowns.at(at) == unknown as u64)
+        find(&self.unknowns, self.count, unknown)
     }
 
     /// Mean of one band over all of `rays` rays, with the exact sky or with theirs, and the square of its expected error.
@@ -185,24 +185,30 @@ impl Gathered {
     }
 }
 
+/// Where an unknown stands among the first `count` that are kept of a pixel.
+pub(super) fn find(unknowns: &[u64; KEPT], count: u64, unknown: usize) -> Option<usize> {
+    unknowns.iter().take(count as usize).position(|own| *own == unknown as u64)
+}
+
 /// Rays that settle what arrives at a point to an irradiance over pi of `tolerance` where half of a hemisphere is bright.
 pub(super) fn usual_rays(tolerance: f64) -> f64 {
     pow(0.8 / tolerance, 4.0 / 3.0)
 }
 
 /// Least and most standard deviation of a ray over that where half of a hemisphere is bright.
-const SPREAD: (f64, f64) = (1e-3, 1.0);
+const RAY_SPREAD: (f64, f64) = (1e-3, 1.0);
 
-/// The same factor more where the sun shines: places in its light are few and bright.
+/// Standard deviation of what is met where the sun shines over that under the sky alone: places in its light are few and
+/// bright.
 const SUNLIT: f64 = 2.5;
 
-/// Least standard deviation of what is met over its mean, on the scale of [`SPREAD`].
+/// Least standard deviation of what is met over its mean, on the scale of [`RAY_SPREAD`].
 const LEAST_VARIED: f64 = 0.3;
 
 /// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is met: of
 /// three tenths of the hemisphere.
 pub(super) fn spread(reflected: f64) -> f64 {
-    clamp(3.0 * reflected, SPREAD.0, SPREAD.1)
+    clamp(3.0 * reflected, RAY_SPREAD.0, RAY_SPREAD.1)
 }
 
 /// Where a ray from a point goes on diffusely.
@@ -340,7 +346,7 @@ impl Solved<'_> {
     /// Standard deviation of a ray from a point over that where half of a hemisphere is bright: where the straight sky is
     /// known, of what is met, which the element tells about, whether it is met or not.
     fn spread_at(&self, spot: &Spot<'_>) -> f64 {
-        let Some(open) = spot.open else { return SPREAD.1 };
+        let Some(open) = spot.open else { return RAY_SPREAD.1 };
         let (bands, blocked) = (self.shape.bands, (1.0 - open.share).max(f64::MIN_POSITIVE));
         let of = |(band, reference): (usize, &f64)| {
             let met = held(spot.values, bands, spot.local, spot.open, band) / (PI * blocked);
@@ -349,7 +355,7 @@ impl Solved<'_> {
         let met = self.reference.iter().enumerate().map(of).fold(0.0, f64::max);
         let met = if self.light.sun.is_some() { SUNLIT * met } else { met };
         let chance = 2.0 * sqrt(blocked * open.share.max(0.0));
-        clamp(met * chance.max(LEAST_VARIED * blocked), SPREAD.0, SPREAD.1)
+        clamp(met * chance.max(LEAST_VARIED * blocked), RAY_SPREAD.0, RAY_SPREAD.1)
     }
 
     /// One more ray from a point.
@@ -464,7 +470,7 @@ impl Solved<'_> {
         }
         let [apart @ .., alike] =
             gathered.carried.map(|sum| (sum / f64::from(rays)) * (sum / f64::from(rays)));
-        let carried = MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + ALIKE * alike;
+        let carried = MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + COHERENT * alike;
         (DOUBT * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
     }
 }

@@ -87,7 +87,8 @@ impl Walk<'_> {
         match self {
             Walk::Remembered(at) => {
                 *at += 1;
-                outlook.images.all.head(outlook.images.count).get(*at - 1).copied()
+                let images = outlook.images.as_ref()?;
+                images.all.head(images.count).get(*at - 1).copied()
             }
             Walk::All(nearby) => nearby.next(),
         }
@@ -97,7 +98,8 @@ impl Walk<'_> {
 /// Ways asked for lately; the same answers whether they are remembered or not.
 pub struct Outlook<'m> {
     ways: &'m mut [Way],
-    images: Images,
+    /// None for a single ray: they are too large to be set up for it.
+    images: Option<Images>,
     /// What may be outlines from points of facets.
     pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
@@ -118,14 +120,16 @@ impl<'m> Outlook<'m> {
     /// rays have this area each, and so many follow them toward the sun.
     pub fn new(ways: &'m mut [Way], parallel: bool, area: f64, sun: f64) -> Outlook<'m> {
         let least = if parallel { WORTH * area } else { 0.0 };
-        Outlook { ways, parallel, least: (least, least / sun), ..Outlook::none() }
+        let all = [Image::default(); IMAGES];
+        let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
+        let images = (IMAGES > 0).then_some(images);
+        Outlook { ways, images, parallel, least: (least, least / sun), ..Outlook::none() }
     }
 
     /// No outlook: every ray is traced.
     pub fn none() -> Outlook<'m> {
-        let all = [Image::default(); IMAGES];
-        let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
-        Outlook { ways: &mut [], images, candidates: Candidates::none(), parallel: false, least: (0.0, 0.0) }
+        let candidates = Candidates::none();
+        Outlook { ways: &mut [], images: None, candidates, parallel: false, least: (0.0, 0.0) }
     }
 
     /// The same with room for outlines.
@@ -140,29 +144,22 @@ impl<'m> Outlook<'m> {
 
     /// The images of the sun that may be seen from a point of a surface.
     pub(super) fn images<'a>(&mut self, solved: &Solved<'a>, surface: &Surface, spread: f64) -> Walk<'a> {
-        let (sides, side) =
-            (solved.elements.facet_sides(), surface.facet * solved.scene.sides() + surface.side);
-        if IMAGES == 0 {
-            return Walk::All(solved.images.near((sides, side), surface.point, 0.0, spread));
-        }
-        let images = &mut self.images;
+        let side = (solved.elements.facet_sides(), surface.facet * solved.scene.sides() + surface.side);
+        let near = |reach: f64| solved.images.near(side, surface.point, reach, spread);
+        let Some(images) = &mut self.images else { return Walk::All(near(0.0)) };
         let apart = surface.point - images.centre;
         let here = Some((surface.facet, surface.side));
         if images.side != here || apart.dot(apart) > images.reach * images.reach {
             let reach = REACH * sqrt(solved.scene.areas().at(surface.facet));
             (images.side, images.centre, images.reach, images.count) = (here, surface.point, reach, 0);
-            for image in solved.images.near((sides, side), surface.point, reach, spread) {
+            for image in near(reach) {
                 if images.count < IMAGES {
                     images.all.set(images.count, image);
                 }
                 images.count += 1;
             }
         }
-        if images.count <= IMAGES {
-            Walk::Remembered(0)
-        } else {
-            Walk::All(solved.images.near((sides, side), surface.point, 0.0, spread))
-        }
+        if images.count <= IMAGES { Walk::Remembered(0) } else { Walk::All(near(0.0)) }
     }
 
     /// The facets that may stand in the way of rays that leave the flat `surface`'s side along `direction`, or along any

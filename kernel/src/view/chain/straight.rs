@@ -1,6 +1,6 @@
 //! The sky that a point sees straight, by outlines, in place of what its element holds of it.
 
-use super::gather::{BANDS, KEPT};
+use super::gather::{BANDS, KEPT, find};
 use super::{Outlook, Solved, linear};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
@@ -39,7 +39,7 @@ impl KeptSkies {
         KeptSkies { beyond: [[0.0; BANDS]; KEPT], rest: [[0.0; 3]; KEPT], unknowns: [0; KEPT], count: 0 };
 
     fn find(&self, unknown: usize) -> Option<usize> {
-        (0..(self.count as usize).min(KEPT)).find(|&at| self.unknowns.at(at) == unknown as u64)
+        find(&self.unknowns, self.count, unknown)
     }
 }
 
@@ -78,7 +78,7 @@ impl<'a> Solved<'a> {
                 *value = (*value + linear(held, bands, local, band)).max(0.0);
             }
             // what is blocked goes with it, so that both fill the hemisphere
-            let by_element = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
+            let by_element = blocked_by_element(held, bands, local);
             let blocked = clamp(beyond + by_element, 0.0, 1.0);
             let ratio = ratio(blocked, by_element)?;
             return (known > 0.0).then_some(OpenAt {
@@ -98,7 +98,7 @@ impl<'a> Solved<'a> {
                 kept.rest.set(place, [0.0; 3]);
                 return None;
             };
-            let by_element = linear(open.held.part(3 * bands..3 * bands + 3), 1, local, 0);
+            let by_element = blocked_by_element(open.held, bands, local);
             kept.rest.set(place, [1.0, 1.0 - open.share - by_element, open.variance]);
             if let Some(beyond) = kept.beyond.get_mut(place) {
                 for (band, (to, value)) in beyond.iter_mut().zip(&open.irradiance).enumerate().take(bands) {
@@ -143,10 +143,14 @@ impl<'a> Solved<'a> {
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
         let share = open.values[0];
-        let blocked = linear(held.part(3 * bands..3 * bands + 3), 1, local, 0);
-        let ratio = ratio(1.0 - share, blocked)?;
+        let ratio = ratio(1.0 - share, blocked_by_element(held, bands, local))?;
         Some(OpenAt { irradiance, held, share, ratio, variance: open.error * open.error })
     }
+}
+
+/// Share of the hemisphere that is blocked at a point by an element's linear function.
+fn blocked_by_element(held: &[f64], bands: usize, local: Local) -> f64 {
+    linear(held.part(3 * bands..3 * bands + 3), 1, local, 0)
 }
 
 /// By what all else that arrives counts where this share of the hemisphere is blocked, beside that by an element's linear
