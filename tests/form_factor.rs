@@ -6,7 +6,7 @@
 mod support;
 
 use blik_kernel::form_factor::{
-    LANES, TriangleBlock, exchange_area, point_to_polygon, point_to_triangle, point_to_triangles,
+    TRIANGLE_LANES, TriangleBlock, exchange_area, point_to_polygon, point_to_triangle, point_to_triangles,
     polygon_to_polygon,
 };
 use blik_kernel::math::Vec3;
@@ -315,21 +315,21 @@ proptest! {
     /// On every instruction set the same bits, and the scalar routine's value: both round numbers up to pi/2 pi
     /// a dozen times.
     #[test]
-    fn batches_agree_with_single_triangles(triangles in prop::collection::vec(triangle(), 3 * LANES)) {
+    fn batches_agree_with_single_triangles(triangles in prop::collection::vec(triangle(), 3 * TRIANGLE_LANES)) {
         let n = v(0.0, 0.0, 1.0);
         let p = v(0.1, -0.2, -1.01);
         let mut blocks = [TriangleBlock::EMPTY; 4];
         for (k, t) in triangles.iter().enumerate() {
-            blocks[k / LANES].set(k % LANES, t);
+            blocks[k / TRIANGLE_LANES].set(k % TRIANGLE_LANES, t);
         }
-        let (mut wide, mut narrow) = ([[-1.0; LANES]; 4], [[-1.0; LANES]; 4]);
+        let (mut wide, mut narrow) = ([[-1.0; TRIANGLE_LANES]; 4], [[-1.0; TRIANGLE_LANES]; 4]);
         point_to_triangles(Isa::detect(), p, n, &blocks, &mut wide);
         point_to_triangles(Isa::BASELINE, p, n, &blocks, &mut narrow);
         prop_assert_eq!(wide, narrow);
         for (got, t) in wide.iter().flatten().zip(&triangles) {
             prop_assert!((got - point_to_triangle(p, n, t)).abs() <= 1e-15);
         }
-        prop_assert_eq!(wide[3], [0.0; LANES]);
+        prop_assert_eq!(wide[3], [0.0; TRIANGLE_LANES]);
     }
 
     #[test]

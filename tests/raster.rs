@@ -4,7 +4,7 @@
 use blik_kernel::arena::{Arena, Memory, Need};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::math::{Vec3, frame};
-use blik_kernel::raster::{Items, Lines, NOTHING, Samples, UNSURE};
+use blik_kernel::raster::{Items, Lines, NO_FACET_DRAWN, Samples, UNSURE};
 use blik_kernel::ray::normal;
 use blik_kernel::simd::Isa;
 
@@ -103,13 +103,13 @@ fn compare(what: &str, bvh: &Bvh<'_>, samples: &Samples, together: usize) -> (us
         for row in rows {
             // nothing is skipped that is something
             for skipped in 0..items.next(row, 0, COLUMNS as isize) {
-                assert_eq!(items.facet(row, skipped), NOTHING, "{what}: {row}, {skipped}");
+                assert_eq!(items.facet(row, skipped), NO_FACET_DRAWN, "{what}: {row}, {skipped}");
             }
             for column in 0..COLUMNS as isize {
                 let ray = samples.ray(row, column as f64 + samples.shift(row));
-                let truth = bvh.closest(&ray).map_or(NOTHING, |hit| hit.facet);
+                let truth = bvh.closest(&ray).map_or(NO_FACET_DRAWN, |hit| hit.facet);
                 let drawn = items.facet(row, column);
-                met += usize::from(truth != NOTHING);
+                met += usize::from(truth != NO_FACET_DRAWN);
                 unsure += usize::from(drawn == UNSURE);
                 assert!(drawn == UNSURE || drawn == truth, "{what}: {row}, {column}: {drawn}, not {truth}");
             }
@@ -188,7 +188,7 @@ fn lines_show_what_rays_along_them_meet() {
                     for at in [0.001, 0.3, 0.5, 0.999] {
                         let at = span.start + at * (span.end - span.start);
                         let hit = bvh.closest(&samples.ray(row, at));
-                        let facet = hit.map_or(NOTHING, |h| h.facet);
+                        let facet = hit.map_or(NO_FACET_DRAWN, |h| h.facet);
                         assert!(
                             facet == span.facet() || span.end - span.start < 1e-9,
                             "{name}, row {row} at {at}: {facet}, not {}",

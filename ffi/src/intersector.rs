@@ -5,7 +5,7 @@ use crate::memory::*;
 use crate::scene::{blik_ray, blik_scene};
 use crate::status::*;
 use crate::types::{Sized_, read, sized};
-use blik_kernel::bvh::{BATCH, Intersector, NO_FACET};
+use blik_kernel::bvh::{INTERSECTOR_RAYS_MOST, Intersector, NO_FACET};
 use blik_kernel::ray::Ray;
 use blik_kernel::scene::Scene;
 use core::ffi::c_void;
@@ -113,13 +113,13 @@ impl Caller {
             blik_ray { origin: [0.0; 3], direction: [0.0; 3], t_max: 0.0, skip: crate::scene::BLIK_NO_FACET };
         let (mut rays, mut answers) = (rays, answers);
         while !rays.is_empty() {
-            let count = rays.len().min(BATCH);
+            let count = rays.len().min(INTERSECTOR_RAYS_MOST);
             let (Some((now, later)), Some((out, rest))) =
                 (rays.split_at_checked(count), answers.split_at_mut_checked(count))
             else {
                 return;
             };
-            let mut outside = [none; BATCH];
+            let mut outside = [none; INTERSECTOR_RAYS_MOST];
             for (to, ray) in outside.iter_mut().zip(now) {
                 *to = self.outside(ray);
             }
@@ -142,7 +142,7 @@ impl Intersector for Caller {
     fn any(&self, rays: &[Ray], hits: &mut [u32]) -> bool {
         let Some(find) = self.tracer.any_facets else { return false };
         self.batches(rays, hits, |rays, hits| {
-            let mut found = [0; BATCH];
+            let mut found = [0; INTERSECTOR_RAYS_MOST];
             // SAFETY: as above; a batch is no longer than the array.
             unsafe { find(self.tracer.user, rays.as_ptr(), rays.len(), found.as_mut_ptr()) };
             hits.iter_mut().zip(found).for_each(|(hit, found)| *hit = u32::from(found));

@@ -22,7 +22,7 @@ use core::ffi::c_void;
 use core::ops::Range;
 
 /// Rows or samples of one piece of work.
-const PIECE: usize = 8;
+const PLANE_PIECE_ROWS: usize = 8;
 
 /// What is done with a range of rows.
 type Rows<'a> = dyn Fn(Range<usize>, &mut Scratch<'_>) -> Result<(), blik_error> + Sync + 'a;
@@ -59,12 +59,12 @@ impl Lanes {
         runner: &mut Runner,
         work: &Rows<'_>,
     ) -> Result<(), blik_error> {
-        runner.each(rows.div_ceil(PIECE), self.count, share, &|lane, item| {
+        runner.each(rows.div_ceil(PLANE_PIECE_ROWS), self.count, share, &|lane, item| {
             // SAFETY: a lane's part is used by that lane alone, one item after the other; there are `count` parts.
             let memory =
                 unsafe { core::slice::from_raw_parts_mut(self.start.at(lane * self.size), self.size) };
             let mut scratch = Scratch::new(scene, cuts, memory)?;
-            work(item * PIECE..((item + 1) * PIECE).min(rows), &mut scratch)
+            work(item * PLANE_PIECE_ROWS..((item + 1) * PLANE_PIECE_ROWS).min(rows), &mut scratch)
         })
     }
 }

@@ -3,7 +3,7 @@
 use crate::status::*;
 use crate::types::{Sized_, read, sized};
 use blik_kernel::Error;
-use blik_kernel::stages::{Executor, Merge};
+use blik_kernel::stages::{Executor, LANES_MOST, Merge};
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
 use core::ptr::null_mut;
@@ -53,9 +53,6 @@ impl Default for blik_run {
         }
     }
 }
-
-/// The most lanes.
-pub(crate) const MOST_LANES: usize = 256;
 
 /// A value that threads take turns at. Held for a few instructions only.
 pub(crate) struct Turns<T> {
@@ -110,9 +107,9 @@ impl Runner {
     pub unsafe fn new(run: *const blik_run) -> Result<Runner, blik_error> {
         // SAFETY: by the caller's promise.
         let run = if run.is_null() { blik_run::default() } else { unsafe { read(run) }? };
-        if !(1..=MOST_LANES).contains(&run.lanes) {
+        if !(1..=LANES_MOST).contains(&run.lanes) {
             let error = blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_LANES);
-            return Err(error.sizes(MOST_LANES, run.lanes));
+            return Err(error.sizes(LANES_MOST, run.lanes));
         }
         Ok(Runner { run, done: 0.0 })
     }

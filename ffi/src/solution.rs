@@ -331,7 +331,7 @@ pub unsafe extern "C" fn blik_solution_init(
 
 /// Bytes beyond which memory for beams is not enlarged.
 #[cfg(feature = "std")]
-const MOST_BYTES: usize = if usize::BITS > 32 { 1 << 34 } else { 1 << 30 };
+const BEAM_BYTES_MOST: usize = if usize::BITS > 32 { 1 << 34 } else { 1 << 30 };
 
 /// Lights a scene and solves for its diffuse radiance, in memory of its own.
 ///
@@ -371,7 +371,7 @@ pub unsafe extern "C" fn blik_solution_create(
                     }
                     return Ok(());
                 }
-                Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL && size < MOST_BYTES => {
+                Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL && size < BEAM_BYTES_MOST => {
                     size = size.saturating_mul(4);
                 }
                 Err(error) => return Err(error),

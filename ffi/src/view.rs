@@ -430,7 +430,7 @@ fn follow(
 }
 
 /// Rays of one piece.
-const RAYS: usize = 256;
+const RADIANCE_PIECE_RAYS: usize = 256;
 
 /// Radiance against rays.
 ///
@@ -468,13 +468,13 @@ pub unsafe extern "C" fn blik_radiance(
         let start = Start(out.as_mut_ptr());
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
-            follow(count.div_ceil(RAYS), given, &mut runner, |item, memory| {
+            follow(count.div_ceil(RADIANCE_PIECE_RAYS), given, &mut runner, |item, memory| {
                 let short = Error::BufferTooSmall { needed: lane_bytes()?, given: memory.len() };
                 let mut arena = Arena::new(memory, 0)?;
                 let (terms, work) = (arena.take::<Terms>(1)?, arena.take::<Work>(1)?);
                 let (terms, work) = (terms.first_mut().ok_or(short)?, work.first_mut().ok_or(short)?);
-                let first = item * RAYS;
-                let own = rays.iter().skip(first).take(RAYS);
+                let first = item * RADIANCE_PIECE_RAYS;
+                let own = rays.iter().skip(first).take(RADIANCE_PIECE_RAYS);
                 // SAFETY: every item is handed out once, and its values lie within the array.
                 let out =
                     unsafe { core::slice::from_raw_parts_mut(start.at(first * bands), own.len() * bands) };

@@ -28,7 +28,7 @@ mod product;
 mod rule;
 mod visible;
 
-pub use batch::{LANES, TriangleBlock, point_to_triangles};
+pub use batch::{TRIANGLE_LANES, TriangleBlock, point_to_triangles};
 pub use convex::Convex;
 pub use pair::{exchange_area, polygon_to_polygon};
 pub use point::{point_to_polygon, point_to_triangle};

@@ -76,7 +76,7 @@ impl System<'_> {
     }
 
     /// A sweep that goes `relaxation` times the way from what `to` holds to what a plain sweep of `from` makes.
-    /// Returns the largest change that the plain sweep makes of `from`, changes within [`ROUNDING`] apart.
+    /// Returns the largest change that the plain sweep makes of `from`, changes within [`STEP_ROUNDING`] apart.
     pub fn relaxed_sweep(
         &self,
         range: Range<usize>,
@@ -105,7 +105,7 @@ impl System<'_> {
                 let old = from.at(unknown * bands + band);
                 let reference = reference.at(band);
                 let step = fabs(new - old);
-                if reference > 0.0 && step > ROUNDING * new {
+                if reference > 0.0 && step > STEP_ROUNDING * new {
                     change = change.max(step / reference);
                 }
                 *out = relax(*out, new, relaxation);
@@ -363,7 +363,7 @@ impl System<'_> {
 
 /// Steps of so small a share of a radiance are rounding, which no sweep undoes: a few roundings of each of a row's
 /// records, which come to sqrt(n).
-pub const ROUNDING: f64 = 16.0 * f64::EPSILON;
+pub const STEP_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// `new` itself where the relaxation is 1.
 #[inline(always)]

@@ -13,12 +13,12 @@ const STEPS: (f64, f64) = (0.3, 0.7);
 const IDLE: f64 = 0.8;
 
 /// The most rays and bytes that another round may be expected to take.
-const MOST_RAYS: f64 = 2e8;
-const MOST_BYTES: f64 = (2u64 << 30) as f64;
+const ROUND_RAYS_MOST: f64 = 2e8;
+const ROUND_BYTES_MOST: f64 = (2u64 << 30) as f64;
 
 /// Tolerance of an image's first solution over that of the image: rays from the image's points find the rest, and light that
 /// is reflected once more counts with the reflectance, from many elements whose errors differ.
-const COARSE: f64 = 3.0;
+const FIRST_ROUND_FACTOR: f64 = 3.0;
 
 /// The most of it: coarser elements tell nothing.
 const COARSEST: f64 = 0.02;
@@ -28,12 +28,12 @@ const COARSEST: f64 = 0.02;
 const FINE_IMAGE: f64 = 2e-3;
 
 /// Estimates of a part of an image are worse than of all by less than this factor.
-const PART: f64 = 1.15;
+const REGION_FACTOR: f64 = 1.15;
 
 /// The tolerance of the solution of an image's first round.
 pub fn first(asked: f64) -> f64 {
     if GATHERS {
-        asked.max(COARSEST.min(COARSE * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)))
+        asked.max(COARSEST.min(FIRST_ROUND_FACTOR * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)))
     } else {
         asked
     }
@@ -60,7 +60,7 @@ pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> O
     let coarse = last.tolerance > asked;
     let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
-    let most = (last.rays as f64 / MOST_RAYS).max(last.bytes as f64 / MOST_BYTES);
+    let most = (last.rays as f64 / ROUND_RAYS_MOST).max(last.bytes as f64 / ROUND_BYTES_MOST);
     let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
     // closed forms are as cheap as that
     let wanted = if coarse && last.rays == 0 { asked / last.tolerance } else { asked / last.estimate };
@@ -71,5 +71,5 @@ pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> O
 
 /// As [`again`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.
 pub fn at_once(asked: f64, look: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
-    (look.estimate > PART * asked).then(|| again(asked, look, before, rounds)).flatten()
+    (look.estimate > REGION_FACTOR * asked).then(|| again(asked, look, before, rounds)).flatten()
 }

@@ -7,7 +7,7 @@ use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
 use crate::base::math::{clamp, pow};
 use crate::coupling::rows::RowSettings;
-use crate::coupling::word::LONGEST;
+use crate::coupling::word::MIRRORS_MOST;
 use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::Shape;
 use crate::scene::sun::Sun;
@@ -105,7 +105,7 @@ pub fn planes(scene: &Scene<'_>, rows: &RowSettings) -> bool {
 
 /// The most probing rays of a point: all points of a triangle together have as many as a row of the coupling.
 pub fn probing(rows: &RowSettings) -> u32 {
-    (rows.rays / 16).clamp(16, crate::coupling::subdivide::MOST_RAYS)
+    (rows.rays / 16).clamp(16, crate::coupling::subdivide::PROBE_RAYS_MOST)
 }
 
 /// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the images' by what
@@ -133,7 +133,7 @@ pub fn beams(scene: &Scene<'_>, sun: &Sun<'_>, settings: &Settings) -> Option<Be
         return None;
     }
     let rays = clamp(BEAM_RAYS / budget.image, FEWEST_BEAM_RAYS, MOST_BEAM_RAYS);
-    let mirrors = max_bounces.unwrap_or(u32::MAX).min(LONGEST as u32);
+    let mirrors = max_bounces.unwrap_or(u32::MAX).min(MIRRORS_MOST as u32);
     Some(BeamSettings::new(scene, sun, rays, budget.beam_chains, mirrors))
 }
 

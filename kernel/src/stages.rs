@@ -90,12 +90,15 @@ impl Merge for Largest {
     }
 }
 
+/// Largest number of lanes that an [`Executor`] may have: each takes rows and scratch memory of its own.
+pub const LANES_MOST: usize = 256;
+
 /// Rows that one piece of work fills: enough pieces to balance two dozen threads, large enough that a block's head does not
 /// count.
 pub fn block_rows(rows: usize) -> usize {
-    rows.div_ceil(BLOCKS).clamp(BLOCK_ROWS.0, BLOCK_ROWS.1)
+    rows.div_ceil(ROW_BLOCKS).clamp(BLOCK_ROWS.0, BLOCK_ROWS.1)
 }
 
 /// Blocks that the rows of a scene are split into, and the fewest and most rows of one.
-const BLOCKS: usize = 256;
+const ROW_BLOCKS: usize = 256;
 const BLOCK_ROWS: (usize, usize) = (16, 1024);

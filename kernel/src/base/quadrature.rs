@@ -69,7 +69,7 @@ impl<const N: usize> Gauss<N> {
 }
 
 /// The rules that [`rule`] chooses from.
-static RULES: (Gauss<4>, Gauss<6>, Gauss<8>, Gauss<10>, Gauss<12>, Gauss<16>, Gauss<24>, Gauss<32>) = (
+static GAUSS_LEGENDRE: (Gauss<4>, Gauss<6>, Gauss<8>, Gauss<10>, Gauss<12>, Gauss<16>, Gauss<24>, Gauss<32>) = (
     Gauss::new(),
     Gauss::new(),
     Gauss::new(),
@@ -84,14 +84,14 @@ static RULES: (Gauss<4>, Gauss<6>, Gauss<8>, Gauss<10>, Gauss<12>, Gauss<16>, Ga
 /// points; of the largest where none has as many.
 pub fn rule(points: usize) -> (&'static [f64], &'static [f64]) {
     match points {
-        0..=4 => (&RULES.0.nodes, &RULES.0.weights),
-        5..=6 => (&RULES.1.nodes, &RULES.1.weights),
-        7..=8 => (&RULES.2.nodes, &RULES.2.weights),
-        9..=10 => (&RULES.3.nodes, &RULES.3.weights),
-        11..=12 => (&RULES.4.nodes, &RULES.4.weights),
-        13..=16 => (&RULES.5.nodes, &RULES.5.weights),
-        17..=24 => (&RULES.6.nodes, &RULES.6.weights),
-        _ => (&RULES.7.nodes, &RULES.7.weights),
+        0..=4 => (&GAUSS_LEGENDRE.0.nodes, &GAUSS_LEGENDRE.0.weights),
+        5..=6 => (&GAUSS_LEGENDRE.1.nodes, &GAUSS_LEGENDRE.1.weights),
+        7..=8 => (&GAUSS_LEGENDRE.2.nodes, &GAUSS_LEGENDRE.2.weights),
+        9..=10 => (&GAUSS_LEGENDRE.3.nodes, &GAUSS_LEGENDRE.3.weights),
+        11..=12 => (&GAUSS_LEGENDRE.4.nodes, &GAUSS_LEGENDRE.4.weights),
+        13..=16 => (&GAUSS_LEGENDRE.5.nodes, &GAUSS_LEGENDRE.5.weights),
+        17..=24 => (&GAUSS_LEGENDRE.6.nodes, &GAUSS_LEGENDRE.6.weights),
+        _ => (&GAUSS_LEGENDRE.7.nodes, &GAUSS_LEGENDRE.7.weights),
     }
 }
 

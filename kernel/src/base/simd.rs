@@ -68,6 +68,10 @@ impl Isa {
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 const LEAN: bool = cfg!(not(any(test, feature = "std")));
 
+/// One bit for each 16-bit lane of a NEON register: what a mask's lanes are weighed by where they become a number's bits.
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+const LANE_BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+
 /// A computation to be compiled for each instruction set; `run` must be `#[inline(always)]`.
 pub trait Task {
     /// What it returns.
@@ -438,11 +442,10 @@ mod neon {
         /// One bit of each.
         #[inline(always)]
         fn bits(self) -> u32 {
-            const BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
             // SAFETY: the target has NEON; the array has as many bytes as the register, and no alignment is asked.
             unsafe {
                 let masks = vcombine_u16(vmovn_u32(self.0), vmovn_u32(self.1));
-                vaddvq_u16(vandq_u16(masks, vld1q_u16(BITS.as_ptr()))).into()
+                vaddvq_u16(vandq_u16(masks, vld1q_u16(super::LANE_BITS.as_ptr()))).into()
             }
         }
     }

@@ -4,15 +4,15 @@ use crate::base::index::{Index, IndexMut};
 use core::cmp::Ordering;
 
 /// Slices up to this are sorted by insertion.
-const FEW: usize = 20;
+const INSERTION_SORT_MOST: usize = 20;
 
 /// Parts that wait while longer ones are sorted: each is at most half of the one before, so that a million values need no
 /// more. The last to fit is sorted as a heap.
-const WAITING: usize = 16;
+const SORT_PARTS_WAITING: usize = 16;
 
 /// Sorts `slice`; equal values end in any order.
 pub(crate) fn sort<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T) -> Ordering) {
-    if slice.len() <= FEW {
+    if slice.len() <= INSERTION_SORT_MOST {
         return insertion(slice, compare);
     }
     // as often as halving would need, and as much again: beyond, the values are made to defeat the pivots
@@ -21,11 +21,11 @@ pub(crate) fn sort<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T)
 }
 
 fn quick<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T) -> Ordering, depth: u32) {
-    let (mut longer, mut waiting) = ([(0, 0, 0); WAITING], 0);
+    let (mut longer, mut waiting) = ([(0, 0, 0); SORT_PARTS_WAITING], 0);
     let (mut start, mut end, mut depth) = (0, slice.len(), depth);
     loop {
         let part = slice.part_mut(start..end);
-        if part.len() > FEW && depth > 0 && waiting < WAITING {
+        if part.len() > INSERTION_SORT_MOST && depth > 0 && waiting < SORT_PARTS_WAITING {
             depth -= 1;
             let cut = start + partition(part, compare);
             let (low, high) = ((start, cut), (cut + 1, end));
@@ -36,7 +36,7 @@ fn quick<T: Copy + Default>(slice: &mut [T], compare: &impl Fn(&T, &T) -> Orderi
             (start, end) = short;
             continue;
         }
-        if part.len() > FEW {
+        if part.len() > INSERTION_SORT_MOST {
             heap(part, compare)
         } else {
             insertion(part, compare)
@@ -54,7 +54,7 @@ pub(crate) fn select<T: Copy + Default>(
     compare: &impl Fn(&T, &T) -> Ordering,
 ) {
     let mut depth = 2 * (usize::BITS - slice.len().leading_zeros());
-    while slice.len() > FEW && count > 0 && count < slice.len() {
+    while slice.len() > INSERTION_SORT_MOST && count > 0 && count < slice.len() {
         if depth == 0 {
             return heap(slice, compare);
         }

@@ -1,7 +1,7 @@
 //! Couplings in baked blocks.
 
 use super::bundle::Bundles;
-use super::word::{EMPTY, LONGEST, Word};
+use super::word::{MIRRORS_MOST, STRAIGHT, Word};
 use super::{ABSENT, BLOCKED, Block, ENCLOSED, Head, Record, Row};
 use crate::base::arena::View;
 use crate::base::arena::Writer;
@@ -56,7 +56,7 @@ impl<'m> Block<'m> {
         let bands = scene.bands();
         let of = |word: usize| self.products.part(word * bands..(word + 1) * bands);
         self.words.iter().enumerate().all(|(at, word)| {
-            if at == usize::from(EMPTY) {
+            if at == usize::from(STRAIGHT) {
                 return word.depth == 0 && of(at).iter().all(|p| *p == 1.0);
             }
             let parent: Word = self.words.at(word.parent as usize);
@@ -64,7 +64,7 @@ impl<'m> Block<'m> {
             let factors = of(word.parent as usize).iter().zip(specular);
             (word.parent as usize) < at
                 && word.depth == parent.depth + 1
-                && word.depth as usize <= LONGEST
+                && word.depth as usize <= MIRRORS_MOST
                 && specular.len() == bands
                 && of(at).iter().zip(factors).all(|(p, (q, rho))| *p == q * rho)
         })

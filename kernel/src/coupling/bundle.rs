@@ -15,7 +15,7 @@ use core::cmp::Ordering;
 const HEAD: usize = 10;
 
 /// Words of a record.
-const WORDS: usize = size_of::<Record>() / size_of::<u32>();
+const RECORD_WORDS: usize = size_of::<Record>() / size_of::<u32>();
 
 /// Rays that leave a row by the same word and count alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,8 +124,8 @@ pub(super) fn pack(escapes: &mut [Record]) -> usize {
         words.set(at, record.packed());
         at += 1;
     }
-    let needed = at.div_ceil(WORDS);
-    arena::words_mut(escapes).part_mut(at..needed * WORDS).fill(0);
+    let needed = at.div_ceil(RECORD_WORDS);
+    arena::words_mut(escapes).part_mut(at..needed * RECORD_WORDS).fill(0);
     needed
 }
 

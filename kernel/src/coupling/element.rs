@@ -17,7 +17,7 @@ use crate::scene::Scene;
 #[derive(Clone, Copy, Debug)]
 pub struct Elements<'m> {
     first: &'m [u32],
-    /// Of each node of the trees: [`LEAF`] and its element, or the first of its four quarters' nodes.
+    /// Of each node of the trees: [`ELEMENT_NODE`] and its element, or the first of its four quarters' nodes.
     nodes: &'m [u32],
     facet: &'m [u32],
     path: &'m [u32],
@@ -26,13 +26,13 @@ pub struct Elements<'m> {
 }
 
 /// Marks nodes that are elements.
-const LEAF: u32 = 1 << 31;
+const ELEMENT_NODE: u32 = 1 << 31;
 
 /// A point on an element: its local coordinates, each the barycentric weight of a corner less 1/3.
 pub type Local = (f64, f64);
 
 /// The quarters of a node that still wait while a tree is walked.
-const WAITING: usize = Path::DEEPEST as usize * (QUARTERS - 1) + 1;
+const NODES_WAITING: usize = Path::DEEPEST as usize * (QUARTERS - 1) + 1;
 
 /// Calls `leaf` with (facet, node, path) of every element, by facet, first quarters first. `child` gives a node's first
 /// quarter, `None` for an element. False where `leaf` says so or the trees are deeper than can be.
@@ -42,7 +42,7 @@ fn walk(
     mut leaf: impl FnMut(usize, usize, Path) -> bool,
 ) -> bool {
     for facet in 0..facets {
-        let mut waiting = [(0usize, Path::default()); WAITING];
+        let mut waiting = [(0usize, Path::default()); NODES_WAITING];
         waiting.set(0, (facet, Path::default()));
         let mut count = 1;
         while count > 0 {
@@ -94,7 +94,7 @@ impl<'m> Elements<'m> {
         let child = |node: usize| trees.get(node).map(|n| n.child as usize).filter(|c| *c != 0);
         let mut at = 0;
         walk(facets, child, |facet, node, path| {
-            nodes.set(node, LEAF | at as u32);
+            nodes.set(node, ELEMENT_NODE | at as u32);
             facet_of.set(at, facet as u32);
             paths.set(at, path.0);
             at += 1;
@@ -171,13 +171,13 @@ impl<'m> Elements<'m> {
     pub fn locate(&self, facet: usize, side: usize, u: f64, v: f64) -> (usize, Local) {
         let (mut node, mut point) = (self.nodes.at(facet), (u, v));
         for _ in 0..Path::DEEPEST {
-            if node & LEAF != 0 {
+            if node & ELEMENT_NODE != 0 {
                 break;
             }
             let (quarter, next) = quarter::into(point.0, point.1);
             (node, point) = (self.nodes.at(node as usize + quarter), next);
         }
-        ((node & !LEAF) as usize * self.sides + side, (point.0 - 1.0 / 3.0, point.1 - 1.0 / 3.0))
+        ((node & !ELEMENT_NODE) as usize * self.sides + side, (point.0 - 1.0 / 3.0, point.1 - 1.0 / 3.0))
     }
 
     /// Barycentric weights in the facet of the point (a, b) (weights of corners 1 and 2) of an element.

@@ -6,7 +6,7 @@
 //! the row's rays would have.
 
 use super::sink::Sink;
-use super::word::EMPTY;
+use super::word::STRAIGHT;
 use super::{BLOCKED, Record};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, clamp, fabs, pow, sqrt};
@@ -14,11 +14,11 @@ use crate::base::quarter::{self, Path, QUARTERS, point};
 use crate::base::simd::Isa;
 use crate::coupling::element::Elements;
 use crate::coupling::facing::{Clear, Facing, Receiver};
-use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
+use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::scene::{NO_MIRROR, Scene};
 
 /// Gauss points of a triangle: weights of corners 1 and 2, weight. Of degree 1, 2 and 4 (Strang and Fix, 1973).
-const ONE: [(f64, f64, f64); 1] = [(1.0 / 3.0, 1.0 / 3.0, 1.0)];
+const GAUSS_POINTS_1: [(f64, f64, f64); 1] = [(1.0 / 3.0, 1.0 / 3.0, 1.0)];
 const THREE: [(f64, f64, f64); 3] =
     [(1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0), (2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0)];
 const SIX: [(f64, f64, f64); 6] = {
@@ -35,7 +35,7 @@ const SIX: [(f64, f64, f64); 6] = {
 };
 
 /// Times that a quarter is cut again beside what it touches.
-const DEEPEST: usize = 4;
+const CONTACT_HALVINGS_MOST: usize = 4;
 
 /// Which rule serves a triangle of so large a radius over the distance.
 #[derive(Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ impl Rules {
 
     fn of(&self, ratio: f64) -> Option<&'static [(f64, f64, f64)]> {
         match ratio {
-            x if x <= self.one => Some(&ONE),
+            x if x <= self.one => Some(&GAUSS_POINTS_1),
             x if x <= self.three => Some(&THREE),
             x if x <= self.six => Some(&SIX),
             _ => None,
@@ -117,7 +117,7 @@ fn targets<'a>(
 /// take a few kilobytes of stack.
 #[derive(Clone, Copy)]
 struct Lanes {
-    unknowns: [u32; LANES],
+    unknowns: [u32; TRIANGLE_LANES],
     count: usize,
 }
 
@@ -195,7 +195,7 @@ impl Entries<'_, '_> {
         let rules = Rules::new(error);
         let quarters = [0, 1, 2, 3].map(|q| Path::default().step(q).corners(&receiver.corners));
         let place = Place { receiver, quarters, rules, middle: middle(&receiver.corners) };
-        let mut lanes = [Lanes { unknowns: [0; LANES], count: 0 }; 3];
+        let mut lanes = [Lanes { unknowns: [0; TRIANGLE_LANES], count: 0 }; 3];
         let mut blocked = Blocked::default();
         let sides = self.scene.sides();
         for facet in facing.before(receiver.facet, receiver.side) {
@@ -208,7 +208,7 @@ impl Entries<'_, '_> {
                     let Some(lanes) = lanes.get_mut(class) else { continue };
                     lanes.unknowns.set(lanes.count, target.unknown as u32);
                     lanes.count += 1;
-                    if lanes.count == LANES {
+                    if lanes.count == TRIANGLE_LANES {
                         self.flush(&place, class, lanes, (known, &mut blocked))?;
                     }
                 }
@@ -265,9 +265,9 @@ impl Entries<'_, '_> {
 
     /// What each of the receiver's quarters sees of these elements, by a rule.
     #[inline(never)]
-    fn means(&self, place: &Place<'_>, class: usize, unknowns: &[u32]) -> [[f64; LANES]; QUARTERS] {
+    fn means(&self, place: &Place<'_>, class: usize, unknowns: &[u32]) -> [[f64; TRIANGLE_LANES]; QUARTERS] {
         let rule: &[(f64, f64, f64)] = match class {
-            0 => &ONE,
+            0 => &GAUSS_POINTS_1,
             1 => &THREE,
             _ => &SIX,
         };
@@ -275,10 +275,10 @@ impl Entries<'_, '_> {
         for (lane, &unknown) in unknowns.iter().enumerate() {
             block.set(lane, &self.elements.corners(self.scene, unknown as usize / self.scene.sides().max(1)));
         }
-        let mut means = [[0.0; LANES]; QUARTERS];
+        let mut means = [[0.0; TRIANGLE_LANES]; QUARTERS];
         for (quarter, means) in place.quarters.iter().zip(&mut means) {
             for &(u, v, weight) in rule {
-                let mut factors = [[0.0; LANES]];
+                let mut factors = [[0.0; TRIANGLE_LANES]];
                 let from = point(quarter, u, v);
                 let block = core::slice::from_ref(&block);
                 point_to_triangles(self.isa, from, place.receiver.normal, block, &mut factors);
@@ -312,7 +312,7 @@ impl Entries<'_, '_> {
             self.sink.push(Record {
                 checks: mark(departure),
                 moment: moment.map(|m| (weight * m) as f32),
-                ..Record::target((target.unknown, (0.0, 0.0)), EMPTY, weight, gradient.map(|g| g as f32))
+                ..Record::target((target.unknown, (0.0, 0.0)), STRAIGHT, weight, gradient.map(|g| g as f32))
             })?;
         }
         blocked.weight += weight;
@@ -340,11 +340,11 @@ impl Entries<'_, '_> {
 
 /// Beside what an element touches, light departs from a linear function by so many times more than its quarters' means
 /// do: in a corner of three walls 2.3 times at coarse elements, 1.1 at fine ones.
-const UNSEEN: f64 = 2.0;
+const CONTACT_CURVATURE_FACTOR: f64 = 2.0;
 
 /// Marks a record as exact until its row ends: its checks are final.
 fn mark(departure: f64) -> [f32; 4] {
-    let departure = (UNSEEN * departure) as f32;
+    let departure = (CONTACT_CURVATURE_FACTOR * departure) as f32;
     [f32::INFINITY, 0.0, departure, departure]
 }
 
@@ -394,14 +394,14 @@ impl Place<'_> {
     /// The mean over a triangle of the receiver of the factor to a target: of its quarters, and theirs, as far as these
     /// are too large for a rule.
     fn mean(&self, triangle: &[Vec3; 3], target: &Target) -> f64 {
-        const NONE: ([Vec3; 3], usize, f64) = ([Vec3::ZERO; 3], 0, 0.0);
+        const UNUSED_TRIANGLE: ([Vec3; 3], usize, f64) = ([Vec3::ZERO; 3], 0, 0.0);
         // triangles in quarters, the next quarter, and the sum over those before
-        let (mut whole, mut depth) = ([NONE; DEEPEST], 0);
+        let (mut whole, mut depth) = ([UNUSED_TRIANGLE; CONTACT_HALVINGS_MOST], 0);
         let mut part = *triangle;
         loop {
             let centre = middle(&part);
             let ratio = radius(&part, centre) / distance(centre, &target.corners).max(f64::MIN_POSITIVE);
-            if ratio > self.rules.six && depth < DEEPEST {
+            if ratio > self.rules.six && depth < CONTACT_HALVINGS_MOST {
                 whole.set(depth, (part, 1, 0.0));
                 depth += 1;
                 part = Path::default().step(0).corners(&part);

@@ -14,24 +14,24 @@ use crate::rays::surface::{OFFSET, opens_to_sky};
 use crate::scene::Scene;
 
 /// Sides of facets beyond which no planes are compared: the table's bits grow with their square.
-pub const MOST: usize = 8192;
+pub const SIDES_MOST: usize = 8192;
 
 /// Words of a set of sides.
-pub(crate) const WORDS: usize = MOST / 64;
+pub(crate) const SIDE_SET_WORDS: usize = SIDES_MOST / 64;
 
 /// Facets that rise before a plane by this share of its facet's extent hide no more than that share of it.
-const SLACK: f64 = 1e-6;
+const PLANE_RISE_SLACK: f64 = 1e-6;
 
 /// Heights and widths below this (scene coordinates) are contact.
 const TOUCHING: f64 = 1e-9;
 
 /// Facets of a block.
-const LANES: usize = 8;
+const PLANE_LANES: usize = 8;
 
-/// Corners of [`LANES`] facets: corner, axis, lane.
-type Corners = [[[f64; LANES]; 3]; 3];
+/// Corners of [`PLANE_LANES`] facets: corner, axis, lane.
+type Corners = [[[f64; PLANE_LANES]; 3]; 3];
 
-/// The sets of facets before each side's plane; none for scenes of more than [`MOST`] sides.
+/// The sets of facets before each side's plane; none for scenes of more than [`SIDES_MOST`] sides.
 #[derive(Clone, Copy, Debug)]
 pub struct Facing<'m> {
     before: &'m [u64],
@@ -48,7 +48,7 @@ impl<'m> Facing<'m> {
     pub const NONE: Facing<'static> = Facing { before: &[], screens: &[], shared: &[], words: 0, sides: 1 };
 
     fn words(scene: &Scene<'_>, wanted: bool) -> usize {
-        let few = scene.facets() * scene.sides() <= MOST;
+        let few = scene.facets() * scene.sides() <= SIDES_MOST;
         if wanted && few { scene.facets().div_ceil(64) } else { 0 }
     }
 
@@ -57,7 +57,7 @@ impl<'m> Facing<'m> {
     pub fn bytes(scene: &Scene<'_>, wanted: bool) -> Result<usize, Error> {
         let words = Facing::words(scene, wanted);
         let rows = scene.facets() * scene.sides();
-        let blocks = if words > 0 { scene.facets().div_ceil(LANES) } else { 0 };
+        let blocks = if words > 0 { scene.facets().div_ceil(PLANE_LANES) } else { 0 };
         let sets = Need::new().and::<u64>(if words > 0 { rows * words } else { 0 });
         sets.and::<u64>(words).and::<u64>(words).and::<u64>(2 * words).and::<Corners>(blocks).bytes()
     }
@@ -78,12 +78,14 @@ impl<'m> Facing<'m> {
         let screens = arena.take::<u64>(words)?;
         let shared = arena.take::<u64>(words)?;
         let (behind, real) = arena.take::<u64>(2 * words)?.split_at_mut_checked(words).unwrap_or_default();
-        let blocks = arena.take::<Corners>(scene.facets().div_ceil(LANES))?;
-        blocks.fill([[[0.0; LANES]; 3]; 3]);
+        let blocks = arena.take::<Corners>(scene.facets().div_ceil(PLANE_LANES))?;
+        blocks.fill([[[0.0; PLANE_LANES]; 3]; 3]);
         [&mut *screens, &mut *shared, &mut *real].into_iter().for_each(|set| set.fill(0));
         for (facet, (corners, area)) in scene.corners().iter().zip(scene.areas()).enumerate() {
-            for (axes, corner) in blocks.iter_mut().skip(facet / LANES).take(1).flatten().zip(corners) {
-                axes.iter_mut().zip(corner.to_array()).for_each(|(lanes, x)| lanes.set(facet % LANES, x));
+            for (axes, corner) in blocks.iter_mut().skip(facet / PLANE_LANES).take(1).flatten().zip(corners) {
+                axes.iter_mut()
+                    .zip(corner.to_array())
+                    .for_each(|(lanes, x)| lanes.set(facet % PLANE_LANES, x));
             }
             if *area > 0.0 {
                 insert(real, facet);
@@ -97,7 +99,7 @@ impl<'m> Facing<'m> {
                 continue;
             }
             let height = scene.corners().at(facet).iter().map(|c| c.dot(normal)).sum::<f64>() / 3.0;
-            let slack = SLACK * sqrt(scene.areas().at(facet)) + 0.5 * OFFSET;
+            let slack = PLANE_RISE_SLACK * sqrt(scene.areas().at(facet)) + 0.5 * OFFSET;
             let front = rows.head_mut(words);
             run(
                 bvh.isa(),
@@ -185,8 +187,8 @@ impl Receiver {
     pub(crate) fn faces(&self, scene: &Scene<'_>, (facet, side): (usize, usize), part: &[Vec3; 3]) -> bool {
         let base = self.corners[0].dot(self.normal);
         let (low, high) = heights(scene, facet, &self.corners);
-        part.iter().all(|c| c.dot(self.normal) - base >= -FLAT)
-            && if side == 0 { low >= -FLAT } else { high <= FLAT }
+        part.iter().all(|c| c.dot(self.normal) - base >= -EDGE_ON_HEIGHT)
+            && if side == 0 { low >= -EDGE_ON_HEIGHT } else { high <= EDGE_ON_HEIGHT }
     }
 }
 
@@ -207,7 +209,7 @@ pub struct Clear<'m> {
 impl<'m> Clear<'m> {
     /// Words of memory for a scene's sides.
     pub fn words(scene: &Scene<'_>) -> usize {
-        (scene.facets() * scene.sides()).div_ceil(64).min(WORDS)
+        (scene.facets() * scene.sides()).div_ceil(64).min(SIDE_SET_WORDS)
     }
 
     /// Nothing is proven yet; `memory` has [`Clear::words`] words of any content.
@@ -236,7 +238,8 @@ impl<'m> Clear<'m> {
         most: usize,
     ) -> bool {
         // the back of a one-sided facet may show, or is hidden by what no plane tells
-        let back = |facet: usize| scene.sides() == 1 && heights(scene, facet, &receiver.corners).0 < -FLAT;
+        let back =
+            |facet: usize| scene.sides() == 1 && heights(scene, facet, &receiver.corners).0 < -EDGE_ON_HEIGHT;
         if facing.is_empty() || facing.before(receiver.facet, receiver.side).any(back) {
             return false;
         }
@@ -253,8 +256,8 @@ impl<'m> Clear<'m> {
     ) -> usize {
         let of = |facet: usize| {
             let (low, high) = heights(scene, facet, &receiver.corners);
-            let front = if high > FLAT { count(facet, 0) } else { 0 };
-            front + if low < -FLAT && scene.sides() == 2 { count(facet, 1) } else { 0 }
+            let front = if high > EDGE_ON_HEIGHT { count(facet, 0) } else { 0 };
+            front + if low < -EDGE_ON_HEIGHT && scene.sides() == 2 { count(facet, 1) } else { 0 }
         };
         facing.before(receiver.facet, receiver.side).map(of).sum()
     }
@@ -273,7 +276,7 @@ impl<'m> Clear<'m> {
         for facet in facing.before(receiver.facet, receiver.side) {
             let (low, high) = heights(scene, facet, &receiver.corners);
             for side in [0, 1] {
-                let seen = if side == 0 { high > FLAT } else { low < -FLAT };
+                let seen = if side == 0 { high > EDGE_ON_HEIGHT } else { low < -EDGE_ON_HEIGHT };
                 if !seen {
                     continue;
                 }
@@ -294,7 +297,7 @@ impl<'m> Clear<'m> {
 }
 
 /// Heights (scene coordinates) below which a plane is seen edge-on.
-const FLAT: f64 = 1e-13;
+const EDGE_ON_HEIGHT: f64 = 1e-13;
 
 /// The least and the greatest height of points above a facet's front.
 fn heights(scene: &Scene<'_>, facet: usize, points: &[Vec3; 3]) -> (f64, f64) {
@@ -348,13 +351,13 @@ impl Task for Compare<'_> {
         let Compare { blocks, normal, height, slack, front, behind } = self;
         for (word, (front, behind)) in front.iter_mut().zip(behind.iter_mut()).enumerate() {
             (*front, *behind) = (0, 0);
-            let start = word * (64 / LANES);
-            let blocks = blocks.part(start..blocks.len().min(start + 64 / LANES));
-            for (block, shift) in blocks.iter().zip((0..64).step_by(LANES)) {
-                let (mut high, mut low) = ([0.0; LANES], [0.0; LANES]);
+            let start = word * (64 / PLANE_LANES);
+            let blocks = blocks.part(start..blocks.len().min(start + 64 / PLANE_LANES));
+            for (block, shift) in blocks.iter().zip((0..64).step_by(PLANE_LANES)) {
+                let (mut high, mut low) = ([0.0; PLANE_LANES], [0.0; PLANE_LANES]);
                 let [a, b, c] = block;
                 for (lane, (high, low)) in high.iter_mut().zip(&mut low).enumerate() {
-                    let of = |corner: &[[f64; LANES]; 3]| {
+                    let of = |corner: &[[f64; PLANE_LANES]; 3]| {
                         let [x, y, z] = corner;
                         normal.x * x[lane] + normal.y * y[lane] + normal.z * z[lane] - height
                     };

@@ -16,7 +16,7 @@
 
 use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::sink::Sink;
-use super::word::{EMPTY, LONGEST};
+use super::word::{MIRRORS_MOST, STRAIGHT};
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::base::arena::{Arena, Need};
 use crate::base::budget::ErrorBudget;
@@ -28,7 +28,7 @@ use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
 use crate::coupling::facing::{Clear, Facing, Receiver};
 use crate::coupling::subdivide::INSIDE;
-use crate::rays::bvh::{Bvh, GROUP};
+use crate::rays::bvh::{Bvh, STREAM_RAYS};
 use crate::rays::inside::inside;
 use crate::rays::ray::{Hit, Ray};
 use crate::rays::surface::{Surface, opens_to_sky};
@@ -52,19 +52,19 @@ pub struct RowSettings {
 }
 
 /// Parts of an element: its quarters.
-const PARTS: usize = QUARTERS;
+const ELEMENT_PARTS: usize = QUARTERS;
 
 /// Parts of the parts.
-const BINS: usize = PARTS * PARTS;
+const ROW_BINS: usize = ELEMENT_PARTS * ELEMENT_PARTS;
 
 /// The most rays of one row: each part's sequence has 2^16 points.
-pub const MOST_RAYS: u32 = (PARTS as u32) << 16;
+pub const ROW_RAYS_MOST: u32 = (ELEMENT_PARTS as u32) << 16;
 
 /// The gradients, in local coordinates, of the linear function through what the exposed parts see, by what each of
 /// them sees: through three corners; along the line of two, and the same across it; none.
-fn slopes(open: [bool; PARTS]) -> [[f64; 2]; PARTS] {
+fn slopes(open: [bool; ELEMENT_PARTS]) -> [[f64; 2]; ELEMENT_PARTS] {
     // of the barycentric weights; from part to part at the corners they change by a half
-    const WEIGHTS: [[f64; 2]; PARTS] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
+    const WEIGHTS: [[f64; 2]; ELEMENT_PARTS] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0]];
     let corners = open.iter().take(3).filter(|&&o| o).count();
     let sum = |k: usize| WEIGHTS.iter().zip(open).filter(|(_, o)| *o).map(|(w, _)| w.at(k)).sum::<f64>();
     let of = |part: usize, k: usize| match corners {
@@ -77,8 +77,8 @@ fn slopes(open: [bool; PARTS]) -> [[f64; 2]; PARTS] {
 
 /// By what each exposed part counts in how far light departs from the linear function: the middle one beside the
 /// corners' mean; where some are not exposed, half the difference between two; none where one is all.
-fn departures(open: [bool; PARTS]) -> [f64; PARTS] {
-    if open == [true; PARTS] {
+fn departures(open: [bool; ELEMENT_PARTS]) -> [f64; ELEMENT_PARTS] {
+    if open == [true; ELEMENT_PARTS] {
         return [-1.0 / 3.0, -1.0 / 3.0, -1.0 / 3.0, 1.0];
     }
     let mut sign = if open.iter().filter(|&&o| o).count() > 1 { 0.5 } else { 0.0 };
@@ -92,7 +92,7 @@ fn departures(open: [bool; PARTS]) -> [f64; PARTS] {
 }
 
 /// The most entries in closed form of one row.
-const MOST_CLOSED: usize = 4096;
+const ROW_CLOSED_FORMS_MOST: usize = 4096;
 
 /// Entries in closed form up to which all are entered where nothing hides any.
 const CHEAP: usize = 1024;
@@ -108,17 +108,17 @@ const MOST_FACTOR: f64 = 2.0;
 const LEAST_FACTOR: f64 = 0.25;
 
 /// Rays that meet their first facets together: few where the stack is small.
-const TOGETHER: usize = if cfg!(feature = "std") { GROUP } else { 4 };
+const ROW_RAYS_TOGETHER: usize = if cfg!(feature = "std") { STREAM_RAYS } else { 4 };
 
 /// The fewest rays of a row.
-const FEWEST: u32 = 64;
+const ROW_RAYS_FEWEST: u32 = 64;
 
 /// Fewer rays from outside a body say less of an element than what is beside it.
 const LEAST_EXPOSED: u32 = 32;
 
 /// The power of two nearest to so many rays.
 fn whole(rays: f64) -> u32 {
-    let most = (clamp(rays, f64::from(FEWEST), f64::from(MOST_RAYS)) * SQRT_2) as u32;
+    let most = (clamp(rays, f64::from(ROW_RAYS_FEWEST), f64::from(ROW_RAYS_MOST)) * SQRT_2) as u32;
     1 << most.checked_ilog2().unwrap_or(0)
 }
 
@@ -130,7 +130,7 @@ impl RowSettings {
 
     /// The same with half the rays; `None` where a row has the fewest.
     pub fn fewer(self) -> Option<Self> {
-        (self.rays > FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
+        (self.rays > ROW_RAYS_FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
     }
 
     /// The same with as many rays as make no more than `budget` first rays of so many rows, or the fewest.
@@ -152,7 +152,7 @@ impl RowSettings {
         all: bool,
     ) -> Self {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
-        let longest = super::word::LONGEST as u32;
+        let longest = super::word::MIRRORS_MOST as u32;
         RowSettings {
             rays: whole(pow(0.9 * diffuse / budget.solution, 1.5)),
             cutoff: budget.row_chains,
@@ -220,7 +220,7 @@ struct Start {
     facet: usize,
     side: usize,
     frame: (Vec3, Vec3),
-    sequences: [Sequence; PARTS],
+    sequences: [Sequence; ELEMENT_PARTS],
 }
 
 /// What the rays of a row have found so far.
@@ -230,22 +230,22 @@ struct Tally {
     chain_rays: u32,
     /// Rays that met what is not entered in closed form; rays of each part that met what is, and mirrors among it.
     blocked: u32,
-    clear: [u32; PARTS],
-    mirrored: [[u32; MIRROR_KINDS]; PARTS],
+    clear: [u32; ELEMENT_PARTS],
+    mirrored: [[u32; MIRROR_KINDS]; ELEMENT_PARTS],
     lost: f64,
     /// What is entered in closed form.
     known: Known,
     /// Rays of each part's parts, and how many of them met a black back first.
-    bins: [u32; BINS],
-    backs: [u32; BINS],
+    bins: [u32; ROW_BINS],
+    backs: [u32; ROW_BINS],
     /// Whether rays of a part's part are told apart by where they start, and how many started inside a body.
-    apart: [bool; BINS],
-    inside: [u32; BINS],
+    apart: [bool; ROW_BINS],
+    inside: [u32; ROW_BINS],
 }
 
 impl Tally {
     /// Where some rays of the row met black backs: the parts of the parts of which not all did.
-    fn mixed(&self) -> [bool; BINS] {
+    fn mixed(&self) -> [bool; ROW_BINS] {
         let some = self.backs.iter().any(|b| *b > 0);
         core::array::from_fn(|bin| some && self.backs.at(bin) < self.bins.at(bin))
     }
@@ -257,7 +257,7 @@ impl Tally {
         if self.known.share() == 0.0 {
             return kinds;
         }
-        let rays: u32 = (0..PARTS).map(|bin| self.bins.at(part * PARTS + bin)).sum();
+        let rays: u32 = (0..ELEMENT_PARTS).map(|bin| self.bins.at(part * ELEMENT_PARTS + bin)).sum();
         let of = |share: f64, of: u32| {
             if of > 0 { share.max(0.0) * f64::from(rays) / f64::from(of) } else { 0.0 }
         };
@@ -269,18 +269,20 @@ impl Tally {
     }
 
     /// Rays of each part's part that did not start inside a body; all where hardly one did not, and then true.
-    fn exposed(&self) -> ([u32; BINS], bool) {
-        let mut exposed = [0; BINS];
-        for part in 0..PARTS {
-            let of = |counts: &[u32; BINS], bin: usize| counts.at(part * PARTS + bin);
-            let sum = |counts: &[u32; BINS]| (0..PARTS).map(|bin| of(counts, bin)).sum::<u32>();
+    fn exposed(&self) -> ([u32; ROW_BINS], bool) {
+        let mut exposed = [0; ROW_BINS];
+        for part in 0..ELEMENT_PARTS {
+            let of = |counts: &[u32; ROW_BINS], bin: usize| counts.at(part * ELEMENT_PARTS + bin);
+            let sum = |counts: &[u32; ROW_BINS]| (0..ELEMENT_PARTS).map(|bin| of(counts, bin)).sum::<u32>();
             let inside = |backs: u32, rays: u32| f64::from(backs) >= INSIDE * f64::from(rays);
-            for bin in 0..PARTS {
+            for bin in 0..ELEMENT_PARTS {
                 let (backs, rays) = match of(&self.bins, bin) {
-                    few if few < FEWEST / PARTS as u32 => (sum(&self.backs), sum(&self.bins)),
+                    few if few < ROW_RAYS_FEWEST / ELEMENT_PARTS as u32 => {
+                        (sum(&self.backs), sum(&self.bins))
+                    }
                     rays => (of(&self.backs, bin), rays),
                 };
-                let at = part * PARTS + bin;
+                let at = part * ELEMENT_PARTS + bin;
                 let seen = match (self.apart[at], inside(backs, rays)) {
                     (true, _) => self.bins.at(at).saturating_sub(self.inside.at(at)),
                     (false, true) => 0,
@@ -330,11 +332,11 @@ impl Tracer<'_, '_> {
     /// The row by rays alone.
     #[inline(never)]
     fn sampled(&mut self, start: &Start, most: u32, tally: &mut Tally) -> Option<()> {
-        self.rays(start, (FEWEST.max(most / 16), most), [false; BINS], None, tally)?;
+        self.rays(start, (ROW_RAYS_FEWEST.max(most / 16), most), [false; ROW_BINS], None, tally)?;
         let mixed = tally.mixed();
         if self.scene.sides() == 1 && mixed.contains(&true) {
             self.sink.drop_row();
-            self.rays(start, (FEWEST.max(most / 16), most), mixed, None, tally)?;
+            self.rays(start, (ROW_RAYS_FEWEST.max(most / 16), most), mixed, None, tally)?;
         }
         Some(())
     }
@@ -358,7 +360,7 @@ impl Tracer<'_, '_> {
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
-        let limit = (2 * most as usize).clamp(CHEAP, MOST_CLOSED);
+        let limit = (2 * most as usize).clamp(CHEAP, ROW_CLOSED_FORMS_MOST);
         let possible = Clear::possible(self.scene, self.facing, &receiver, count);
         if possible == 0 || possible > limit {
             return Some(false);
@@ -379,7 +381,7 @@ impl Tracer<'_, '_> {
         }
         *tally = Tally::default();
         if !clear.all || self.scene.largest_specular() > 0.0 {
-            self.rays(start, (FEWEST, most), [false; BINS], Some(&clear), tally)?;
+            self.rays(start, (ROW_RAYS_FEWEST, most), [false; ROW_BINS], Some(&clear), tally)?;
             if tally.backs.iter().any(|b| *b > 0) {
                 self.sink.drop_row();
                 return Some(false);
@@ -389,7 +391,7 @@ impl Tracer<'_, '_> {
             self.sink.drop_row();
             return Some(false);
         }
-        let all = [true; PARTS];
+        let all = [true; ELEMENT_PARTS];
         let entries = Entries {
             scene: self.scene,
             elements: self.elements,
@@ -409,11 +411,11 @@ impl Tracer<'_, '_> {
 
     /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
     fn is_worth(&mut self, start: &Start, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
-        if entries <= FEWEST as usize {
+        if entries <= ROW_RAYS_FEWEST as usize {
             return Some(true);
         }
-        while tally.rays < FEWEST {
-            let count = (FEWEST - tally.rays).min(TOGETHER as u32);
+        while tally.rays < ROW_RAYS_FEWEST {
+            let count = (ROW_RAYS_FEWEST - tally.rays).min(ROW_RAYS_TOGETHER as u32);
             self.batch(start, tally, count, None)?;
         }
         self.sink.drop_row();
@@ -427,7 +429,7 @@ impl Tracer<'_, '_> {
         &mut self,
         start: &Start,
         (fewest, most): (u32, u32),
-        apart: [bool; BINS],
+        apart: [bool; ROW_BINS],
         clear: Option<&Clear<'_>>,
         tally: &mut Tally,
     ) -> Option<()> {
@@ -435,7 +437,7 @@ impl Tracer<'_, '_> {
         let rho = self.scene.largest_specular();
         let mut goal = fewest.min(most);
         while tally.rays < goal {
-            let count = (goal - tally.rays).min(TOGETHER as u32);
+            let count = (goal - tally.rays).min(ROW_RAYS_TOGETHER as u32);
             self.batch(start, tally, count, clear)?;
             if tally.rays == goal {
                 // what a mirror shows counts with its reflectance
@@ -461,7 +463,8 @@ impl Tracer<'_, '_> {
     fn end_row(&mut self, tally: &Tally) {
         let (exposed, hidden) = tally.exposed();
         let closed = tally.known.share() > 0.0;
-        let rays_of = |part: usize| (0..PARTS).map(|bin| exposed.at(part * PARTS + bin)).sum::<u32>();
+        let rays_of =
+            |part: usize| (0..ELEMENT_PARTS).map(|bin| exposed.at(part * ELEMENT_PARTS + bin)).sum::<u32>();
         let counts = [0, 1, 2, 3].map(rays_of);
         let seen = counts.iter().sum::<u32>();
         let share = 1.0 / f64::from(tally.rays.max(1));
@@ -471,7 +474,7 @@ impl Tracer<'_, '_> {
             && !hidden
             && !closed
             && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
-        let dropped = if enclosed { BLOCKED } else { EMPTY };
+        let dropped = if enclosed { BLOCKED } else { STRAIGHT };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },
             rays: tally.rays,
@@ -486,7 +489,7 @@ impl Tracer<'_, '_> {
         };
         let (slopes, departures) =
             (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
-        let first_half = (tally.rays / (2 * PARTS as u32)) as f32;
+        let first_half = (tally.rays / (2 * ELEMENT_PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen.max(1));
         let kinds = [0, 1, 2, 3].map(|part| tally.kinds(part));
         let exposed_all = seen == tally.rays;
@@ -494,15 +497,16 @@ impl Tracer<'_, '_> {
             if let Some(record) = exact::finished(&record, tally.known.scale) {
                 return Some(record);
             }
-            let (kind, bin) = (record.gradient[0] as usize / BINS, record.gradient[0] as usize % BINS);
-            let scale = kinds.get(bin / PARTS).map_or(1.0, |kinds| kinds.at(kind));
+            let (kind, bin) =
+                (record.gradient[0] as usize / ROW_BINS, record.gradient[0] as usize % ROW_BINS);
+            let scale = kinds.get(bin / ELEMENT_PARTS).map_or(1.0, |kinds| kinds.at(kind));
             record.weight *= scale;
             record.moment = record.moment.map(|m| m * scale as f32);
             if exposed[bin] == 0 || (record.is_escape() && record.word() == dropped) {
                 return None;
             }
-            let own = record.weight / f64::from(counts[bin / PARTS]);
-            let part = bin / PARTS;
+            let own = record.weight / f64::from(counts[bin / ELEMENT_PARTS]);
+            let part = bin / ELEMENT_PARTS;
             let gradient =
                 if exposed_all { slopes[part].map(|slope| (slope * own) as f32) } else { [0.0; 2] };
             let first = record.gradient[1] < first_half;
@@ -525,9 +529,9 @@ impl Tracer<'_, '_> {
         count: u32,
         clear: Option<&Clear<'_>>,
     ) -> Option<()> {
-        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); TOGETHER];
-        let mut bins = [0; TOGETHER];
-        let mut hits = [None; TOGETHER];
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); ROW_RAYS_TOGETHER];
+        let mut bins = [0; ROW_RAYS_TOGETHER];
+        let mut hits = [None; ROW_RAYS_TOGETHER];
         let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
         for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
             (*ray, *bin) = self.ray(start, number);
@@ -543,11 +547,11 @@ impl Tracer<'_, '_> {
     /// Ray `number` of a row, and the part of a part from which it starts.
     #[inline]
     fn ray(&self, start: &Start, number: u32) -> (Ray, usize) {
-        let (part, index) = (number as usize % PARTS, number / PARTS as u32);
+        let (part, index) = (number as usize % ELEMENT_PARTS, number / ELEMENT_PARTS as u32);
         let sequence = &start.sequences[part];
         let (p, q) = sequence.pair(index, 2);
         let (a, b) = triangle(p, q);
-        let bin = part * PARTS + quarter::into(a, b).0;
+        let bin = part * ELEMENT_PARTS + quarter::into(a, b).0;
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
@@ -566,22 +570,22 @@ impl Tracer<'_, '_> {
         bin: usize,
         clear: Option<&Clear<'_>>,
     ) -> Option<()> {
-        let (part, index) = (tally.rays as usize % PARTS, tally.rays / PARTS as u32);
+        let (part, index) = (tally.rays as usize % ELEMENT_PARTS, tally.rays / ELEMENT_PARTS as u32);
         let sequence = &start.sequences[part];
         let first = ray.direction;
         *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
         let mut mark = [bin as f32, index as f32];
-        let (mut word, mut weight) = (EMPTY, 1.0);
+        let (mut word, mut weight) = (STRAIGHT, 1.0);
         let ray_start = self.sink.used();
         loop {
-            tally.chain_rays += u32::from(word != EMPTY);
+            tally.chain_rays += u32::from(word != STRAIGHT);
             let Some(hit) = met else {
                 let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
                 return self.sink.push(escape);
             };
             let surface = Surface::of_hit(self.scene, &hit);
-            if word == EMPTY {
+            if word == STRAIGHT {
                 tally.backs[bin] += u32::from(surface.is_none());
                 if tally.apart[bin] && inside(self.bvh, &ray, self.scene.side_normal(start.facet, start.side))
                 {
@@ -589,7 +593,7 @@ impl Tracer<'_, '_> {
                     return Some(());
                 }
             }
-            let known = word == EMPTY
+            let known = word == STRAIGHT
                 && clear
                     .zip(surface.as_ref())
                     .is_some_and(|(c, s)| c.has(s.facet, s.side, self.scene.sides()));
@@ -602,9 +606,9 @@ impl Tracer<'_, '_> {
                     && let Some(rays) = tally.mirrored.get_mut(part).and_then(|all| all.get_mut(kind))
                 {
                     *rays += 1;
-                    mark[0] += ((1 + kind) * BINS) as f32;
+                    mark[0] += ((1 + kind) * ROW_BINS) as f32;
                 }
-            } else if word == EMPTY {
+            } else if word == STRAIGHT {
                 tally.blocked += 1;
                 self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
             }
@@ -619,7 +623,7 @@ impl Tracer<'_, '_> {
                 let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
                 let rest = weight * self.sink.words.largest(word) * rho;
                 tally.lost += rest;
-                if depth as usize >= LONGEST {
+                if depth as usize >= MIRRORS_MOST {
                     self.sink.close(ray_start, rest);
                 }
                 return Some(());

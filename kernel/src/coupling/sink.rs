@@ -1,12 +1,12 @@
 //! Writes rows of records into a block of caller memory.
 
-use super::word::{EMPTY, Word, Words};
+use super::word::{STRAIGHT, Word, Words};
 use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
 use crate::base::arena::{ALIGNMENT, Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::sort;
-use crate::coupling::facing::WORDS;
+use crate::coupling::facing::SIDE_SET_WORDS;
 use crate::scene::Scene;
 use core::cmp::Ordering;
 use core::ops::Range;
@@ -17,7 +17,7 @@ pub fn bytes(rows: usize, records: usize, unmerged: usize, bands: usize) -> Resu
     let all = rows.saturating_mul(records).saturating_add(unmerged);
     let capacity = word_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
     // behind the block, a set of sides while rows are made
-    fixed(rows, capacity, bands).and::<Record>(all).and::<u64>(2 * ALIGNMENT / 8 + WORDS).bytes()
+    fixed(rows, capacity, bands).and::<Record>(all).and::<u64>(2 * ALIGNMENT / 8 + SIDE_SET_WORDS).bytes()
 }
 
 /// Words that a block of so many bytes has room for: 1/16 of it.
@@ -31,7 +31,7 @@ fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
 }
 
 /// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
-const MOST_CLOSED: f64 = 0.5;
+pub(crate) const CLOSED_REMAINDER_MOST: f64 = 0.5;
 
 /// The rows of a block while they are being written.
 #[derive(Debug)]
@@ -100,7 +100,7 @@ impl<'m> Sink<'m> {
     /// it set out for, is taken to go on as it went so far, S + rest S + rest^2 S ... = S/(1 - rest). Where all facets
     /// shine alike that is exact; no more than `rest` is added anywhere.
     pub fn close(&mut self, start: usize, rest: f64) {
-        if !(0.0..=MOST_CLOSED).contains(&rest) {
+        if !(0.0..=CLOSED_REMAINDER_MOST).contains(&rest) {
             return;
         }
         let all = 1.0 / (1.0 - rest);
@@ -163,7 +163,7 @@ impl<'m> Sink<'m> {
         let targets = row.partition_point(|r| !r.is_escape());
         let escapes = self.start + targets;
         let enclosed = stats.state == ENCLOSED;
-        let word = if enclosed { EMPTY } else { BLOCKED };
+        let word = if enclosed { STRAIGHT } else { BLOCKED };
         let own = row.part(targets..kept).iter().filter(|r| r.word() == word).map(|r| r.weight).sum::<f64>();
         let blocked = if enclosed { 1.0 - own } else { own };
         let packed = bundle::pack(row.part_mut(targets..kept));

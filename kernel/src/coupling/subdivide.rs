@@ -15,18 +15,18 @@ use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::base::quarter::{Path, QUARTERS, out_of};
 use crate::base::simd::Isa;
 use crate::coupling::detail::DetailSearch;
-use crate::coupling::facing::{Clear, Facing, Receiver, WORDS};
-use crate::form_factor::{LANES, TriangleBlock, point_to_triangle, point_to_triangles};
+use crate::coupling::facing::{Clear, Facing, Receiver, SIDE_SET_WORDS};
+use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::rays::bvh::{AnswerBuffer, Bvh};
 use crate::rays::surface::{Surface, opens_to_sky};
 use crate::scene::Scene;
 use core::ops::Range;
 
 /// Probed points of a triangle: the middles of its quarters' quarters.
-const POINTS: usize = QUARTERS * QUARTERS;
+const PROBE_POINTS: usize = QUARTERS * QUARTERS;
 
 /// The most rays from one of them.
-pub const MOST_RAYS: u32 = 1024;
+pub const PROBE_RAYS_MOST: u32 = 1024;
 
 /// The fewest.
 const FEWEST_RAYS: u32 = 16;
@@ -35,7 +35,7 @@ const FEWEST_RAYS: u32 = 16;
 pub const INSIDE: f64 = 0.9375;
 
 /// The most facets that a triangle's points see for which closed forms cost less than rays.
-const MOST_CLOSED: usize = 2048;
+const PROBE_CLOSED_FORMS_MOST: usize = 2048;
 
 /// Unevenness counts from so many times the noise of half the rays on: one even triangle in ten thousand passes.
 const CERTAIN: f64 = 1.0;
@@ -44,7 +44,7 @@ const CERTAIN: f64 = 1.0;
 const CLEAR: f64 = 4.0;
 
 /// Unevenness of a triangle of which half is hidden in a body, times 4: points near the edge see part of the inside.
-const EDGE: f64 = 0.04;
+const HALF_HIDDEN_UNEVENNESS: f64 = 0.04;
 
 /// What a quarter keeps of the unevenness of a smooth function.
 const SMOOTH: f64 = 1.0 / 16.0;
@@ -131,12 +131,12 @@ fn counted_area(areas: &[f64]) -> f64 {
 }
 
 /// Elements that a mesh of any facets may have beyond them, at a tolerance of 2e-3.
-const COARSE: f64 = 4096.0;
+const MESH_ELEMENTS_FREE: f64 = 4096.0;
 
 /// The most elements of a scene of `facets` facets: 1 + 2e-3/tolerance times as many, and some more for coarse meshes.
 pub fn most_elements(facets: usize, tolerance: f64) -> usize {
     let finer = 2e-3 / tolerance;
-    (facets as f64 * (1.0 + finer) + COARSE * finer.min(1.0)) as usize
+    (facets as f64 * (1.0 + finer) + MESH_ELEMENTS_FREE * finer.min(1.0)) as usize
 }
 
 /// Nodes of a tree with so many leaves.
@@ -282,7 +282,7 @@ impl Work<'_> {
     /// variance (of shares of the hemisphere) free of the rays' noise; where noise hides it, what `out` held before
     /// (at most the noise). Returns the rays traced.
     ///
-    /// From 16 points of each side go up to `rays` rays ([`MOST_RAYS`] at most), along the same directions: what all
+    /// From 16 points of each side go up to `rays` rays ([`PROBE_RAYS_MOST`] at most), along the same directions: what all
     /// points see alike brings no noise. The product of what two halves of the directions leave of a linear function is
     /// free of the noise's bias. Rays end as soon as they settle the matter.
     pub fn probe(
@@ -297,7 +297,7 @@ impl Work<'_> {
         if out.len() != span(&range) {
             return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
         }
-        let rays = rays.clamp(FEWEST_RAYS, MOST_RAYS);
+        let rays = rays.clamp(FEWEST_RAYS, PROBE_RAYS_MOST);
         let many = most_elements(scene.facets(), budget.solution) as f64;
         let mut probe = Probe { scene, bvh, facing, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
@@ -337,7 +337,7 @@ struct Probe<'a> {
 /// Facets that are looked at together, and by how much each is brighter than the sky.
 struct Together {
     block: TriangleBlock,
-    brightness: [f64; LANES],
+    brightness: [f64; TRIANGLE_LANES],
     count: usize,
 }
 
@@ -349,9 +349,9 @@ impl Together {
     }
 
     /// Adds what they send to each point, and forgets them.
-    fn take(&mut self, isa: Isa, points: &[Vec3; POINTS], normal: Vec3, sums: &mut Sums) {
+    fn take(&mut self, isa: Isa, points: &[Vec3; PROBE_POINTS], normal: Vec3, sums: &mut Sums) {
         for (sum, point) in sums.iter_mut().zip(points) {
-            let mut factors = [[0.0; LANES]];
+            let mut factors = [[0.0; TRIANGLE_LANES]];
             point_to_triangles(isa, *point, normal, core::slice::from_ref(&self.block), &mut factors);
             let terms = factors[0].iter().zip(&self.brightness).take(self.count);
             *sum += terms.map(|(factor, brightness)| factor * brightness).sum::<f64>();
@@ -361,7 +361,7 @@ impl Together {
 }
 
 /// Sums over the rays of each point.
-type Sums = [f64; POINTS];
+type Sums = [f64; PROBE_POINTS];
 
 impl Probe<'_> {
     /// Whether what stands close before one side of a triangle is far smaller than it.
@@ -392,7 +392,8 @@ impl Probe<'_> {
         let from = Surface::new(self.scene, facet, side, 0.0, 0.0);
         let (x, y) = frame(normal);
         let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000 ^ node.path));
-        let (mut sums, mut half, mut backs) = ([0.0; POINTS], [0.0; POINTS], [0u32; POINTS]);
+        let (mut sums, mut half, mut backs) =
+            ([0.0; PROBE_POINTS], [0.0; PROBE_POINTS], [0u32; PROBE_POINTS]);
         let (mut index, mut goal) = (0, FEWEST_RAYS.min(self.rays));
         loop {
             while index < goal {
@@ -421,14 +422,14 @@ impl Probe<'_> {
     /// Unevenness without rays, where nothing hides anything and rays would cost more.
     // apart: its triangles do not burden the stack of the rays
     #[inline(never)]
-    fn closed(&self, node: &Node, side: usize, points: &[Vec3; POINTS]) -> Option<f64> {
+    fn closed(&self, node: &Node, side: usize, points: &[Vec3; PROBE_POINTS]) -> Option<f64> {
         let facet = node.facet as usize;
         let normal = self.scene.side_normal(facet, side);
         let corners = Path(node.path).corners(&self.scene.corners().at(facet));
         let receiver = Receiver { facet, side, normal, corners };
-        let mut proven = [0; WORDS];
+        let mut proven = [0; SIDE_SET_WORDS];
         let mut clear = Clear::new(&mut proven);
-        if !clear.prove_whole(self.scene, self.facing, &receiver, MOST_CLOSED) {
+        if !clear.prove_whole(self.scene, self.facing, &receiver, PROBE_CLOSED_FORMS_MOST) {
             return None;
         }
         Some(self.closed_residuals(&receiver, &clear, points))
@@ -437,10 +438,11 @@ impl Probe<'_> {
     /// The same of a triangle for which all that is clear is known.
     // apart: its sums do not burden the stack of the proof
     #[inline(never)]
-    fn closed_residuals(&self, receiver: &Receiver, clear: &Clear<'_>, points: &[Vec3; POINTS]) -> f64 {
+    fn closed_residuals(&self, receiver: &Receiver, clear: &Clear<'_>, points: &[Vec3; PROBE_POINTS]) -> f64 {
         let Receiver { facet, side, normal, .. } = *receiver;
-        let mut sums = [1.0; POINTS];
-        let mut together = Together { block: TriangleBlock::EMPTY, brightness: [0.0; LANES], count: 0 };
+        let mut sums = [1.0; PROBE_POINTS];
+        let mut together =
+            Together { block: TriangleBlock::EMPTY, brightness: [0.0; TRIANGLE_LANES], count: 0 };
         for other in self.facing.before(facet, side) {
             let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
             for other_side in (0..sides).filter(|&s| clear.has(other, s, sides)) {
@@ -448,7 +450,7 @@ impl Probe<'_> {
                 let brightness = self.brightness(&surface) - 1.0;
                 if receiver.faces(self.scene, (other, other_side), &triangle) {
                     together.put(&triangle, brightness);
-                    if together.count == LANES {
+                    if together.count == TRIANGLE_LANES {
                         together.take(self.bvh.isa(), points, normal, &mut sums);
                     }
                     continue;
@@ -462,22 +464,22 @@ impl Probe<'_> {
         }
         together.take(self.bvh.isa(), points, normal, &mut sums);
         let half = sums.map(|sum| 0.5 * sum);
-        residuals(&half, &sums, &[true; POINTS], 0.5).0
+        residuals(&half, &sums, &[true; PROBE_POINTS], 0.5).0
     }
 
     /// One ray from each point of the facet side that `from` stands for, all along one direction.
     #[inline]
     fn shoot(
         &mut self,
-        (from, points): (&Surface, &[Vec3; POINTS]),
+        (from, points): (&Surface, &[Vec3; PROBE_POINTS]),
         direction: Vec3,
         sums: &mut Sums,
-        backs: &mut [u32; POINTS],
+        backs: &mut [u32; PROBE_POINTS],
     ) {
         let mut ahead = AnswerBuffer::default();
         let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.leave(direction);
-        for ((n, sum), backs) in (0..POINTS as u32).zip(sums).zip(backs) {
-            *sum += match self.bvh.closest_of(&mut ahead, n, POINTS as u32, any) {
+        for ((n, sum), backs) in (0..PROBE_POINTS as u32).zip(sums).zip(backs) {
+            *sum += match self.bvh.closest_of(&mut ahead, n, PROBE_POINTS as u32, any) {
                 None => 1.0,
                 Some(hit) => match Surface::of_hit(self.scene, &hit) {
                     None => {
@@ -488,7 +490,7 @@ impl Probe<'_> {
                 },
             };
         }
-        self.traced += POINTS as u64;
+        self.traced += PROBE_POINTS as u64;
     }
 
     /// What a facet may send, the sky sending 1: before light is known, facets are told apart by where they face.
@@ -513,7 +515,7 @@ fn middle(point: usize) -> (f64, f64) {
 /// Unevenness by the product of both halves' residuals about their best linear functions over the points seen, and the
 /// noise of a half in it. `half` and `all` are sums over the first half's and all rays; a half has `rays` rays.
 #[inline(never)]
-fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64, f64) {
+fn residuals(half: &Sums, all: &Sums, seen: &[bool; PROBE_POINTS], rays: f64) -> (f64, f64) {
     let count = seen.iter().filter(|s| **s).count() as f64;
     if count == 0.0 {
         return (0.0, 0.0);
@@ -524,7 +526,7 @@ fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64,
         let (x, y) = middle(point);
         [x, y, half.at(point) / rays, (all.at(point) - half.at(point)) / rays]
     };
-    let points = || (0..POINTS).filter(|p| seen.at(*p));
+    let points = || (0..PROBE_POINTS).filter(|p| seen.at(*p));
     points().for_each(|p| means.iter_mut().zip(row(p)).for_each(|(m, v)| *m += v / count));
     let mut products = [[0.0; 4]; 4];
     for p in points() {
@@ -536,11 +538,11 @@ fn residuals(half: &Sums, all: &Sums, seen: &[bool; POINTS], rays: f64) -> (f64,
     }
     let [[xx, xy, xa, xb], [_, yy, ya, yb], [_, _, aa, ab], [_, _, _, bb]] = products;
     let determinant = xx * yy - xy * xy;
-    let hidden = 1.0 - count / POINTS as f64;
+    let hidden = 1.0 - count / PROBE_POINTS as f64;
     if hidden > 0.0 {
         // no linear function is known where quarters are hidden, nor what the points beside their edge see
         let freedom = (count - 1.0).max(1.0);
-        let cross = ab / freedom + EDGE * hidden * (1.0 - hidden);
+        let cross = ab / freedom + HALF_HIDDEN_UNEVENNESS * hidden * (1.0 - hidden);
         return (cross, (0.5 * (aa + bb) - ab).max(0.0) / freedom);
     }
     let explained = |(x, y): (f64, f64), (z, w): (f64, f64)| {
@@ -560,7 +562,7 @@ mod tests {
     #[test]
     fn a_jump_is_uneven_and_a_slope_is_not() {
         let of = |f: fn(f64, f64) -> f64, error: f64| {
-            let mut sums = [[0.0; POINTS]; 2];
+            let mut sums = [[0.0; PROBE_POINTS]; 2];
             let [half, all] = &mut sums;
             for (point, (half, all)) in half.iter_mut().zip(all).enumerate() {
                 let (x, y) = middle(point);
@@ -569,7 +571,7 @@ mod tests {
                 *half = 500.0 * (f(x, y) + noise);
                 *all = *half + 500.0 * (f(x, y) - noise);
             }
-            residuals(&sums[0], &sums[1], &[true; POINTS], 500.0)
+            residuals(&sums[0], &sums[1], &[true; PROBE_POINTS], 500.0)
         };
         let (even, noise) = of(|x, y| 0.2 + 0.3 * x + 0.4 * y, 0.0);
         assert!(even.abs() < 1e-15 && noise < 1e-15); // rounding
@@ -582,7 +584,7 @@ mod tests {
     #[test]
     fn points_inside_bodies_do_not_count() {
         let of = |inside: f64| {
-            let (mut sums, mut seen) = ([[0.0; POINTS]; 2], [true; POINTS]);
+            let (mut sums, mut seen) = ([[0.0; PROBE_POINTS]; 2], [true; PROBE_POINTS]);
             let [half, all] = &mut sums;
             for (point, ((half, all), seen)) in half.iter_mut().zip(all).zip(&mut seen).enumerate() {
                 let (x, y) = middle(point);

@@ -11,10 +11,10 @@ use crate::scene::Scene;
 use core::cmp::Ordering;
 
 /// The word without letters: no mirror met.
-pub const EMPTY: u16 = 0;
+pub const STRAIGHT: u16 = 0;
 
 /// The most mirrors that one path may meet.
-pub const LONGEST: usize = 1000;
+pub const MIRRORS_MOST: usize = 1000;
 
 plain_struct! {
     /// One word: its last (highest) mirror class, and the rest.
@@ -73,13 +73,13 @@ impl<'m> Words<'m> {
         self.products.part(at..at + self.bands).iter().fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
-    /// The word with one more letter; `None` where the table is full or the word has [`LONGEST`] letters.
+    /// The word with one more letter; `None` where the table is full or the word has [`MIRRORS_MOST`] letters.
     pub fn push(&mut self, word: u16, class: u32, scene: &Scene<'_>) -> Option<u16> {
-        if self.get(word).depth as usize >= LONGEST {
+        if self.get(word).depth as usize >= MIRRORS_MOST {
             return None;
         }
         let (mut at, mut higher) = (word, 0);
-        while at != EMPTY && self.get(at).class > class {
+        while at != STRAIGHT && self.get(at).class > class {
             (at, higher) = (self.get(at).parent, higher + 1);
         }
         let mut new = self.append(at, class, scene)?;
@@ -182,7 +182,7 @@ mod tests {
         let (mut storage, mut products) = ([Word::default(); 40], [0.0; 80]);
         let mut words = Words::new(&mut storage, &mut products, 2);
         let spell = |words: &mut Words<'_>, letters: &[u32]| {
-            letters.iter().fold(EMPTY, |word, &class| words.push(word, class, &scene).unwrap())
+            letters.iter().fold(STRAIGHT, |word, &class| words.push(word, class, &scene).unwrap())
         };
         let a = spell(&mut words, &[2, 0, 1, 0]);
         assert_eq!(a, spell(&mut words, &[0, 0, 1, 2]));
@@ -194,7 +194,7 @@ mod tests {
         let b = spell(&mut words, &[1, 1, 1, 1]);
         assert_eq!(words.compare(a, b), words.compare(b, a).reverse());
         assert_eq!(words.compare(a, a), Ordering::Equal);
-        let mut word = EMPTY;
+        let mut word = STRAIGHT;
         let mut pushed = 0;
         while let Some(next) = words.push(word, 2, &scene) {
             word = next;

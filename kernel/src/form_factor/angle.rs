@@ -4,8 +4,8 @@ use crate::base::math::{FRAC_PI_2, PI};
 use crate::base::simd::{Lanes64, Wide};
 
 /// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
-const LOW: f64 = 0.414_213_562_373_095_05;
-const HIGH: f64 = 2.414_213_562_373_095;
+const TAN_PI_8: f64 = 0.414_213_562_373_095_05;
+const TAN_3PI_8: f64 = 2.414_213_562_373_095;
 
 /// atan(z)/z in powers of z^2 for |z| <= tan(pi/8): interpolation at the Chebyshev nodes, error 3e-17.
 const ATAN: [f64; 11] = [
@@ -28,7 +28,7 @@ const ATAN: [f64; 11] = [
 #[inline(always)]
 pub(super) fn angle(y: f64, x: f64) -> f64 {
     let wide = x.abs();
-    let (steep, slanted) = (y > HIGH * wide, y > LOW * wide);
+    let (steep, slanted) = (y > TAN_3PI_8 * wide, y > TAN_PI_8 * wide);
     let (above, below, turn) = (
         select(steep, -wide, select(slanted, y - wide, y)),
         select(steep, y, select(slanted, y + wide, wide)),
@@ -45,7 +45,7 @@ pub(super) fn angle(y: f64, x: f64) -> f64 {
 pub(crate) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
     let (zero, least) = (lanes.all(0.0), lanes.all(f64::MIN_POSITIVE));
     let wide = x.abs();
-    let (steep, slanted) = (y.gt(lanes.all(HIGH) * wide), y.gt(lanes.all(LOW) * wide));
+    let (steep, slanted) = (y.gt(lanes.all(TAN_3PI_8) * wide), y.gt(lanes.all(TAN_PI_8) * wide));
     let above = (zero - wide).where_else(steep, (y - wide).where_else(slanted, y));
     let below = y.where_else(steep, (y + wide).where_else(slanted, wide));
     let turn = lanes.all(FRAC_PI_2).where_else(steep, lanes.all(0.5 * FRAC_PI_2).where_else(slanted, zero));

@@ -6,21 +6,21 @@ use crate::base::math::Vec3;
 use crate::base::simd::{Isa, Task, run};
 
 /// Triangles in a block: two registers of the widest instruction set, so that their latencies overlap.
-pub const LANES: usize = 8;
+pub const TRIANGLE_LANES: usize = 8;
 
-/// [`LANES`] triangles, lane by lane: `corners[corner][axis][lane]`. Lanes left over may hold anything finite.
+/// [`TRIANGLE_LANES`] triangles, lane by lane: `corners[corner][axis][lane]`. Lanes left over may hold anything finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct TriangleBlock {
     /// Corner, axis, lane.
-    pub corners: [[[f64; LANES]; 3]; 3],
+    pub corners: [[[f64; TRIANGLE_LANES]; 3]; 3],
 }
 
 impl TriangleBlock {
     /// All lanes at the origin: triangles without area, whose factor is 0.
-    pub const EMPTY: TriangleBlock = TriangleBlock { corners: [[[0.0; LANES]; 3]; 3] };
+    pub const EMPTY: TriangleBlock = TriangleBlock { corners: [[[0.0; TRIANGLE_LANES]; 3]; 3] };
 
-    /// Puts a triangle into a lane; nothing happens where the lane is not below [`LANES`].
+    /// Puts a triangle into a lane; nothing happens where the lane is not below [`TRIANGLE_LANES`].
     pub fn set(&mut self, lane: usize, triangle: &[Vec3; 3]) {
         for (axes, corner) in self.corners.iter_mut().zip(triangle) {
             for (lanes, x) in axes.iter_mut().zip(corner.to_array()) {
@@ -41,7 +41,7 @@ pub fn point_to_triangles(
     p: Vec3,
     n: Vec3,
     blocks: &[TriangleBlock],
-    factors: &mut [[f64; LANES]],
+    factors: &mut [[f64; TRIANGLE_LANES]],
 ) {
     run(isa, Blocks { p, n, blocks, factors });
 }
@@ -51,7 +51,7 @@ struct Blocks<'a> {
     p: Vec3,
     n: Vec3,
     blocks: &'a [TriangleBlock],
-    factors: &'a mut [[f64; LANES]],
+    factors: &'a mut [[f64; TRIANGLE_LANES]],
 }
 
 impl Task for Blocks<'_> {
@@ -62,9 +62,9 @@ impl Task for Blocks<'_> {
         let Blocks { p, n, blocks, factors } = self;
         for (block, out) in blocks.iter().zip(factors) {
             let [u, v, w] = &block.corners;
-            let mut local = [0.0; LANES];
+            let mut local = [0.0; TRIANGLE_LANES];
             for (lane, factor) in local.iter_mut().enumerate() {
-                let corner = |c: &[[f64; LANES]; 3]| Vec3::new(c[0][lane], c[1][lane], c[2][lane]);
+                let corner = |c: &[[f64; TRIANGLE_LANES]; 3]| Vec3::new(c[0][lane], c[1][lane], c[2][lane]);
                 let (u, v, w) = (corner(u), corner(v), corner(w));
                 let (a, b, c) = (u - p, v - p, w - p);
                 *factor = share(edge(a, b, v - u, n) + edge(b, c, w - v, n) + edge(c, a, u - w, n));

@@ -18,7 +18,7 @@ static MANY: Gauss<{ 2 * WIDTH }> = Gauss::new();
 
 /// Panels that wait while those to the left of them are done: a split leaves nine tenths of a panel at most and is made
 /// again but for panels of more than [`SHORTEST`], 131 times at the worst; 14 in all tests. The last to fit is not split.
-const WAITING: usize = 32;
+const PANELS_WAITING: usize = 32;
 
 /// An edge of the inner polygon.
 #[derive(Clone, Copy)]
@@ -124,7 +124,7 @@ impl Integrand {
     /// The integral over the edge, [0, 1], in panels split until every singular point is far enough for a rule.
     fn whole(&self) -> f64 {
         let (mut from, mut to, mut sum) = (0.0, 1.0, 0.0);
-        let (mut ends, mut waiting) = ([0.0; WAITING], 0);
+        let (mut ends, mut waiting) = ([0.0; PANELS_WAITING], 0);
         loop {
             let width = to - from;
             let (worst, sum_of_radii) = self.nearest(from, to);
@@ -132,7 +132,7 @@ impl Integrand {
             // convergence rho; n points leave rho^(-2n).
             if sum_of_radii > 4.8 {
                 sum += self.points(from, width, &FEW.nodes, &FEW.weights);
-            } else if sum_of_radii > 1.6 || width <= SHORTEST || waiting >= WAITING {
+            } else if sum_of_radii > 1.6 || width <= SHORTEST || waiting >= PANELS_WAITING {
                 sum += self.points(from, width, &MANY.nodes, &MANY.weights);
             } else {
                 ends.set(waiting, to);
@@ -228,8 +228,8 @@ impl WideTask for Panel<'_> {
 /// leaves 1e-17 after eleven terms.
 #[inline(always)]
 fn half_log<L: Lanes64>(lanes: L, x: L::F) -> L::F {
-    const HIGH: f64 = 0.5 * 6.931_471_803_691_238e-1;
-    const LOW: f64 = 0.5 * 1.908_214_929_270_587_7e-10;
+    const HALF_LN2_HIGH: f64 = 0.5 * 6.931_471_803_691_238e-1;
+    const HALF_LN2_LOW: f64 = 0.5 * 1.908_214_929_270_587_7e-10;
     let (fraction, exponent) = (x.fraction(), x.exponent());
     let (one, half) = (lanes.all(1.0), lanes.all(0.5));
     let large = fraction.gt(lanes.all(core::f64::consts::SQRT_2));
@@ -245,7 +245,7 @@ fn half_log<L: Lanes64>(lanes: L, x: L::F) -> L::F {
         + (lanes.all(1.0 / 15.0) + lanes.all(1.0 / 17.0) * z2) * z4;
     let high = lanes.all(1.0 / 19.0) + lanes.all(1.0 / 21.0) * z2;
     let series = low + (mid + high * z8) * z8;
-    let log = lanes.all(HIGH) * e + (z + (z * z2 * series + lanes.all(LOW) * e));
+    let log = lanes.all(HALF_LN2_HIGH) * e + (z + (z * z2 * series + lanes.all(HALF_LN2_LOW) * e));
     log.where_else(x.gt(lanes.all(f64::MIN_POSITIVE)), lanes.all(0.0))
 }
 

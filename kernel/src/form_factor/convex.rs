@@ -6,7 +6,7 @@ use crate::base::math::Vec3;
 pub(super) const CAPACITY: usize = 10;
 
 /// Corners of the largest piece that [`pieces`] gives: two cuts fit on top of it.
-const PIECE: usize = 8;
+const PIECE_CORNERS_MOST: usize = 8;
 
 /// A convex polygon in fixed storage; callers meet it only as scratch memory ([`Convex::EMPTY`]).
 #[derive(Clone, Copy, Debug)]
@@ -94,14 +94,14 @@ pub(super) fn double_area(corners: &[Vec3]) -> Vec3 {
     sides.fold(Vec3::ZERO, |sum, (b, c)| sum + (*b - *first).cross(*c - *first))
 }
 
-/// A convex polygon of any number of corners, cut into a fan of at most [`PIECE`] corners each.
+/// A convex polygon of any number of corners, cut into a fan of at most [`PIECE_CORNERS_MOST`] corners each.
 pub(super) fn pieces(polygon: &[Vec3]) -> impl Iterator<Item = Convex> + '_ {
-    const STEP: usize = PIECE - 2;
+    const FAN_STEP: usize = PIECE_CORNERS_MOST - 2;
     let (apex, rest) = polygon.split_first().map_or((Vec3::ZERO, &[][..]), |(a, r)| (*a, r));
-    let count = rest.len().saturating_sub(1).div_ceil(STEP);
+    let count = rest.len().saturating_sub(1).div_ceil(FAN_STEP);
     (0..count).map(move |k| {
         let mut piece = Convex::new(&[apex]);
-        rest.iter().skip(k * STEP).take(PIECE - 1).for_each(|c| piece.push(*c));
+        rest.iter().skip(k * FAN_STEP).take(PIECE_CORNERS_MOST - 1).for_each(|c| piece.push(*c));
         piece
     })
 }

@@ -8,7 +8,7 @@
 pub(super) type Points = &'static [[f64; 3]];
 
 /// Rules from the smallest on: exact for polynomials of degree 5, 7, 9, 11 and 13.
-pub(super) static SQUARE: [Points; RULES] = [
+pub(super) static SQUARE: [Points; CUBATURE_RULES] = [
     &SQUARE_5,
     &turned::<3, 12>(4, None, &SQUARE_7),
     &turned::<4, 17>(4, Some([0.5, 0.5, 0.13168724279835392]), &SQUARE_9),
@@ -17,7 +17,7 @@ pub(super) static SQUARE: [Points; RULES] = [
 ];
 
 /// The same on a triangle.
-pub(super) static TRIANGLE: [Points; RULES] = [
+pub(super) static TRIANGLE: [Points; CUBATURE_RULES] = [
     &turned::<2, 7>(3, Some([THIRD, THIRD, 0.225]), &TRIANGLE_5),
     &turned::<4, 12>(3, None, &TRIANGLE_7),
     &turned::<6, 19>(3, Some([THIRD, THIRD, 0.09713579628279884]), &TRIANGLE_9),
@@ -26,10 +26,10 @@ pub(super) static TRIANGLE: [Points; RULES] = [
 ];
 
 /// Number of rules.
-pub(super) const RULES: usize = 5;
+pub(super) const CUBATURE_RULES: usize = 5;
 
 /// Points of the largest.
-pub(super) const LARGEST: usize = 37;
+pub(super) const CUBATURE_POINTS_MOST: usize = 37;
 
 const THIRD: f64 = 1.0 / 3.0;
 
@@ -169,7 +169,7 @@ mod tests {
     fn rules_integrate_polynomials_of_their_degree() {
         let factorial = |n: i32| (1..=n).map(f64::from).product::<f64>();
         let check = |points: Points, degree: i32, mean: &dyn Fn(i32, i32) -> f64| {
-            assert!(points.len() <= LARGEST);
+            assert!(points.len() <= CUBATURE_POINTS_MOST);
             for p in 0..=degree {
                 for q in 0..=degree - p {
                     let sum: f64 = points.iter().map(|[s, t, w]| w * s.powi(p) * t.powi(q)).sum();

@@ -9,7 +9,7 @@ use crate::base::simd::Isa;
 use core::cmp::Ordering;
 
 /// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.
-const ON_PLANE: f64 = 1e-15;
+pub(super) const PAIR_PLANE_ROUNDING: f64 = 1e-15;
 
 /// The contour form loses this many times the rounding of one operation before the area form takes over.
 const CANCELLATION: f64 = 1e5;
@@ -18,7 +18,7 @@ const CANCELLATION: f64 = 1e5;
 const BUDGET: u32 = 4000;
 
 /// Times that the area form may halve a patch: touching patches never get far enough apart.
-const DEPTH: u32 = 32;
+const AREA_FORM_HALVINGS_MOST: u32 = 32;
 
 /// Form factor from polygon `a` to polygon `b`, both convex and planar: the mean over a of
 /// [`point_to_polygon`](super::point_to_polygon), [`exchange_area`] / area of a.
@@ -88,8 +88,8 @@ pub(super) fn fronts(a: &Convex, b: &Convex) -> Option<(Convex, Convex)> {
     let (pa, pb) = (*a.corners().first()?, *b.corners().first()?);
     let reach =
         b.corners().iter().chain(a.corners()).fold(0.0, |m: f64, c| m.max((*c - pa).abs().max_element()));
-    let front_a = a.clip(|v| (v - pb).dot(nb), ON_PLANE * reach);
-    let front_b = b.clip(|v| (v - pa).dot(na), ON_PLANE * reach);
+    let front_a = a.clip(|v| (v - pb).dot(nb), PAIR_PLANE_ROUNDING * reach);
+    let front_b = b.clip(|v| (v - pa).dot(na), PAIR_PLANE_ROUNDING * reach);
     (!front_a.is_empty() && !front_b.is_empty()).then_some((front_a, front_b))
 }
 
@@ -147,7 +147,7 @@ fn split(a: &Patch, b: &Patch, left: &mut u32, work: &mut impl FnMut(&Patch, &Pa
             path.steps().for_each(|upper| halve(&mut p, &mut q, upper));
         } else {
             *left = left.checked_sub(1)?;
-            if !path.down(DEPTH) {
+            if !path.down(AREA_FORM_HALVINGS_MOST) {
                 return None;
             }
             halve(&mut p, &mut q, false);

@@ -5,14 +5,14 @@ use crate::base::math::{FRAC_1_PI, Vec3, sqrt};
 
 /// Rules by how many times farther apart than large two patches are, for a relative error of at most 1e-10:
 /// measured on 3,000 random pairs of triangles each, the worst being those that see each other edge-on.
-const RULES: [(f64, Rule); 5] =
+const GAUSS_RULES: [(f64, Rule); 5] =
     [(1e4, GAUSS_2), (100.0, GAUSS_3), (16.0, GAUSS_4), (8.0, GAUSS_5), (4.0, GAUSS_6)];
 
 /// Gauss points computed side by side.
-const LANES: usize = 4;
+const PATCH_LANES: usize = 4;
 
-/// Blocks of [`LANES`] points that hold the largest rule's 36.
-const BLOCKS: usize = 9;
+/// Blocks of [`PATCH_LANES`] points that hold the largest rule's 36.
+const PATCH_POINT_BLOCKS: usize = 9;
 
 /// A convex quadrilateral, corners in order; a triangle has its last corner twice.
 #[derive(Clone, Copy)]
@@ -24,14 +24,19 @@ pub(super) struct Patch {
 /// Places that the rule leaves over weigh nothing.
 #[derive(Clone, Copy)]
 struct Points {
-    x: [f64; LANES],
-    y: [f64; LANES],
-    z: [f64; LANES],
-    weight: [f64; LANES],
+    x: [f64; PATCH_LANES],
+    y: [f64; PATCH_LANES],
+    z: [f64; PATCH_LANES],
+    weight: [f64; PATCH_LANES],
 }
 
 impl Points {
-    const NONE: Points = Points { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], weight: [0.0; LANES] };
+    const NONE: Points = Points {
+        x: [0.0; PATCH_LANES],
+        y: [0.0; PATCH_LANES],
+        z: [0.0; PATCH_LANES],
+        weight: [0.0; PATCH_LANES],
+    };
 }
 
 /// The path from a whole to a part of it that was halved again and again, and on to the next part: lower halves first.
@@ -115,7 +120,7 @@ impl Patch {
     pub(super) fn rule(a: &Patch, b: &Patch) -> Option<Rule> {
         let apart = b.centre() - a.centre();
         let ratio = sqrt(apart.dot(apart)) / (a.size() + b.size());
-        RULES.iter().find(|(least, _)| ratio >= *least).map(|(_, rule)| *rule)
+        GAUSS_RULES.iter().find(|(least, _)| ratio >= *least).map(|(_, rule)| *rule)
     }
 
     /// The two halves, cut across the longer direction.
@@ -143,13 +148,13 @@ impl Patch {
     /// r cos is the height of one point over the other's plane, and does not depend on where the other is.
     #[inline(never)]
     pub(super) fn product(a: &Patch, na: Vec3, b: &Patch, nb: Vec3, rule: Rule) -> f64 {
-        let mut on_b = [Points::NONE; BLOCKS];
+        let mut on_b = [Points::NONE; PATCH_POINT_BLOCKS];
         b.points(nb, a, na, rule, &mut on_b);
-        let blocks = (rule.len() * rule.len()).div_ceil(LANES);
-        let mut sums = [0.0; LANES];
+        let blocks = (rule.len() * rule.len()).div_ceil(PATCH_LANES);
+        let mut sums = [0.0; PATCH_LANES];
         for (position, weight) in a.weighed(na, b, nb, rule) {
             let [x, y, z] = position.to_array();
-            let mut row = [0.0; LANES];
+            let mut row = [0.0; PATCH_LANES];
             for t in on_b.iter().take(blocks) {
                 for (lane, sum) in row.iter_mut().enumerate() {
                     let (dx, dy, dz) = (t.x[lane] - x, t.y[lane] - y, t.z[lane] - z);
@@ -170,10 +175,15 @@ impl Patch {
         other: &Patch,
         other_normal: Vec3,
         rule: Rule,
-        blocks: &mut [Points; BLOCKS],
+        blocks: &mut [Points; PATCH_POINT_BLOCKS],
     ) {
         let Vec3 { x, y, z } = self.corners[0];
-        blocks.fill(Points { x: [x; LANES], y: [y; LANES], z: [z; LANES], weight: [0.0; LANES] });
+        blocks.fill(Points {
+            x: [x; PATCH_LANES],
+            y: [y; PATCH_LANES],
+            z: [z; PATCH_LANES],
+            weight: [0.0; PATCH_LANES],
+        });
         let lanes =
             blocks.iter_mut().flat_map(|p| p.x.iter_mut().zip(&mut p.y).zip(&mut p.z).zip(&mut p.weight));
         for ((((x, y), z), weight), (position, own)) in

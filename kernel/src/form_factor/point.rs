@@ -5,7 +5,7 @@ use super::convex::{double_area, edges};
 use crate::base::math::{FRAC_1_PI, Vec3, sqrt};
 
 /// Distances from a plane below this share of the polygon's size are rounding: the point lies in the plane.
-const FLAT: f64 = 8.0 * f64::EPSILON;
+const POINT_PLANE_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Form factor from the point `p` with the unit normal `n` to a planar `polygon`, clipped to p's horizon.
 ///
@@ -71,7 +71,8 @@ pub fn point_to_triangle(p: Vec3, n: Vec3, t: &[Vec3; 3]) -> f64 {
 fn in_plane(a: Vec3, normal: Vec3, polygon: &[Vec3], p: Vec3) -> bool {
     let height = a.dot(normal);
     let reach = polygon.iter().fold(0.0, |m: f64, c| m.max((*c - p).length_squared()));
-    let above = height * height > FLAT * FLAT * reach * normal.length_squared();
+    let above =
+        height * height > POINT_PLANE_ROUNDING * POINT_PLANE_ROUNDING * reach * normal.length_squared();
     // Asked this way round, an overflow that gives no number counts as in the plane.
     !above
 }

@@ -1,10 +1,10 @@
 //! Exchange areas of many pairs of polygons, eight pairs at a time.
 
 use super::convex::double_area;
-use super::cubature::RULES;
+use super::cubature::CUBATURE_RULES;
 use super::pair::{exchange_area_with, power_of_two_below};
 use super::product::{
-    BEHIND, Block, Classes, EXACT, Eight, PLACES, Place, Places, Product, Rule, SHAPES, Shape,
+    BEHIND, Block, Classes, EXACT, Eight, PRODUCT_POINTS, Place, Places, Product, Rule, SHAPES, Shape,
 };
 use crate::base::arena::{Arena, Need};
 use crate::base::error::{Error, Field};
@@ -17,7 +17,7 @@ use core::ops::Range;
 /// each rule of [`super::cubature`] is exact enough: 7e-11 on either side, the worst of 30,000 patches of each shape at
 /// each distance, needles among them, seen at grazing angles and by planes that touch them. All weights are positive, so
 /// that the relative error does not grow where the patches see each other edge-on.
-const LEAST: [f64; RULES] = [100.0, 23.5, 10.3, 6.2, 4.4];
+const RULE_DISTANCES: [f64; CUBATURE_RULES] = [100.0, 23.5, 10.3, 6.2, 4.4];
 
 /// The largest rule for polygons of several patches: with larger ones the exact forms are faster.
 const LARGEST_OF_SEVERAL: u8 = 3;
@@ -168,7 +168,10 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
                     BEHIND => {}
                     _ => {
                         seen = true;
-                        worst = (worst.0.max(class / RULES as u8), worst.1.max(class % RULES as u8));
+                        worst = (
+                            worst.0.max(class / CUBATURE_RULES as u8),
+                            worst.1.max(class % CUBATURE_RULES as u8),
+                        );
                     }
                 }
             }
@@ -182,7 +185,7 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
         // Whatever its shape, a patch is two triangles.
         let [first_rule, second_rule] =
             [worst.0, worst.1].map(|number| Rule { number: number.into(), shape: Shape::Quadrilateral });
-        let (mut first, mut second, mut places) = (Block::EMPTY, Block::EMPTY, [Place::NONE; PLACES]);
+        let (mut first, mut second, mut places) = (Block::EMPTY, Block::EMPTY, [Place::NONE; PRODUCT_POINTS]);
         let (mut lane, mut sum) = (0, 0.0);
         let mut add = |first: &Block, second: &Block, lanes: usize| {
             let product = Product { first, first_rule, second, second_rule, places: &mut places };
@@ -213,7 +216,7 @@ impl<'m, P: AsRef<[Vec3]>> Polygons<'m, P> {
         blocks
             .flat_map(move |b| {
                 let others = self.block(b * WIDTH);
-                let classes = run_wide(self.isa, Classes { own, others, least: &LEAST });
+                let classes = run_wide(self.isa, Classes { own, others, least: &RULE_DISTANCES });
                 (b * WIDTH..).zip(classes)
             })
             .filter(move |(patch, _)| patches.contains(patch))
@@ -260,7 +263,7 @@ struct Row<'p, 'm, P> {
     gathered: Block,
     places: Places,
     /// By the column's shape, then by class.
-    queues: [Queue; SHAPES * RULES * RULES],
+    queues: [Queue; SHAPES * CUBATURE_RULES * CUBATURE_RULES],
 }
 
 impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
@@ -273,8 +276,8 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
             own: polygons.block(patch).spread(patch % WIDTH),
             shape: polygons.block(patch).shape(patch % WIDTH),
             gathered: Block::EMPTY,
-            places: [Place::NONE; PLACES],
-            queues: [Queue { patches: [0; WIDTH], count: 0 }; SHAPES * RULES * RULES],
+            places: [Place::NONE; PRODUCT_POINTS],
+            queues: [Queue { patches: [0; WIDTH], count: 0 }; SHAPES * CUBATURE_RULES * CUBATURE_RULES],
         }
     }
 
@@ -299,7 +302,7 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
         }
         for b in first / WIDTH..end.div_ceil(WIDTH) {
             let others = polygons.block(b * WIDTH);
-            let classes = run_wide(polygons.isa, Classes { own: &self.own, others, least: &LEAST });
+            let classes = run_wide(polygons.isa, Classes { own: &self.own, others, least: &RULE_DISTANCES });
             let lanes = first.saturating_sub(b * WIDTH)..(end - b * WIDTH).min(WIDTH);
             self.block(b, lanes, &classes, others, columns.start, areas);
         }
@@ -339,7 +342,8 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
                 _ if polygons.patches(column).len() > 1 => {}
                 EXACT => areas.set(column.wrapping_sub(start), polygons.exact(self.row, column)),
                 class => {
-                    let number = usize::from(class) + others.shape(lane).number() * RULES * RULES;
+                    let number =
+                        usize::from(class) + others.shape(lane).number() * CUBATURE_RULES * CUBATURE_RULES;
                     if self.push(number, patch) {
                         self.flush(number, start, areas);
                     }
@@ -373,7 +377,10 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
             let patch = *patch as usize;
             gathered.copy(lane, self.polygons.block(patch), patch % WIDTH);
         }
-        let (class, shape) = (number % (RULES * RULES), Shape::numbered(number / (RULES * RULES)));
+        let (class, shape) = (
+            number % (CUBATURE_RULES * CUBATURE_RULES),
+            Shape::numbered(number / (CUBATURE_RULES * CUBATURE_RULES)),
+        );
         let values = self.product(&gathered, class as u8, shape);
         core::mem::swap(&mut gathered, &mut self.gathered);
         for (patch, value) in patches.head(count).iter().zip(values) {
@@ -384,8 +391,8 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
 
     /// The exchange areas of eight pairs, in the square of the caller's unit.
     fn product(&mut self, others: &Block, class: u8, shape: Shape) -> Eight {
-        let own_rule = Rule { number: usize::from(class) / RULES, shape: self.shape };
-        let rule = Rule { number: usize::from(class) % RULES, shape };
+        let own_rule = Rule { number: usize::from(class) / CUBATURE_RULES, shape: self.shape };
+        let rule = Rule { number: usize::from(class) % CUBATURE_RULES, shape };
         let places = &mut self.places;
         let (first, first_rule, second, second_rule) = match self.second {
             true => (others, rule, &self.own, own_rule),

@@ -1,6 +1,7 @@
 //! The area form of the exchange area, of eight pairs of patches side by side.
 
-use super::cubature::{LARGEST, Points, RULES, SQUARE, TRIANGLE};
+use super::cubature::{CUBATURE_POINTS_MOST, CUBATURE_RULES, Points, SQUARE, TRIANGLE};
+use super::pair::PAIR_PLANE_ROUNDING;
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut, pieces};
 use crate::base::math::{FRAC_1_PI, Vec3, fabs, sqrt};
@@ -190,9 +191,9 @@ impl<F: Wide> Wide3<F> {
 pub(super) struct Place([Eight; 4]);
 
 /// Room for the points of one side: of a quadrilateral, those of two triangles.
-pub(super) type Places = [Place; PLACES];
+pub(super) type Places = [Place; PRODUCT_POINTS];
 
-pub(super) const PLACES: usize = 2 * LARGEST;
+pub(super) const PRODUCT_POINTS: usize = 2 * CUBATURE_POINTS_MOST;
 
 impl Place {
     pub(super) const NONE: Place = Place([[0.0; WIDTH]; 4]);
@@ -207,7 +208,8 @@ pub(super) struct Rule {
 
 impl Rule {
     fn points(self) -> Points {
-        let rules: &[Points; RULES] = if self.shape == Shape::Parallelogram { &SQUARE } else { &TRIANGLE };
+        let rules: &[Points; CUBATURE_RULES] =
+            if self.shape == Shape::Parallelogram { &SQUARE } else { &TRIANGLE };
         rules.get(self.number).copied().unwrap_or(&[])
     }
 }
@@ -334,18 +336,15 @@ pub(super) const BEHIND: u8 = 254;
 pub(super) const EXACT: u8 = 255;
 
 /// What is to be done with the pairs of one patch, spread over all lanes, and eight others, by lane: [`BEHIND`],
-/// [`EXACT`], or the number of the rule for the own patch times [`RULES`] and that for the other's.
+/// [`EXACT`], or the number of the rule for the own patch times [`CUBATURE_RULES`] and that for the other's.
 pub(super) struct Classes<'a> {
     pub own: &'a Block,
     pub others: &'a Block,
-    pub least: &'a [f64; RULES],
+    pub least: &'a [f64; CUBATURE_RULES],
 }
 
 /// How much larger than a triangle of the same radius a parallelogram counts, to be integrated as exactly.
 const PARALLELOGRAM: f64 = 1.16;
-
-/// Heights below this share of the pair's extent are rounding: the corner lies on the other's plane.
-const ON_PLANE: f64 = 1e-15;
 
 /// Patches nearer than this, in units of the scene's extent, are left to the exact forms: r^16 would be subnormal.
 const NEAREST: f64 = 1e-15;
@@ -361,7 +360,7 @@ impl WideTask for Classes<'_> {
         let apart = Wide3::load(lanes, &others.centre).minus(Wide3::load(lanes, &own.centre));
         let (radius, other_radius) = (lanes.of(&own.radius), lanes.of(&others.radius));
         let extent = apart.0.abs() + apart.1.abs() + apart.2.abs() + (radius + other_radius);
-        let slack = extent * lanes.all(ON_PLANE);
+        let slack = extent * lanes.all(PAIR_PLANE_ROUNDING);
         let (own_normal, other_normal) =
             (Wide3::load(lanes, &own.normal), Wide3::load(lanes, &others.normal));
         let (high, low) = heights(lanes, to.dot(own_normal), others, own_normal);
@@ -372,7 +371,7 @@ impl WideTask for Classes<'_> {
         let mine = rule_number(lanes, least, lanes.of(&own.size), other_radius, distance2);
         let theirs = rule_number(lanes, least, lanes.of(&others.size), radius, distance2);
         // small whole numbers, all of them exact
-        let rules = lanes.all(RULES as f64);
+        let rules = lanes.all(CUBATURE_RULES as f64);
         let far = L::F::bits(rules.gt(mine)) & L::F::bits(rules.gt(theirs)) & before;
         let numbers = (mine * rules + theirs).array();
         let mut classes = [EXACT; WIDTH];
@@ -398,10 +397,16 @@ fn heights<L: Lanes64>(lanes: L, base: L::F, patch: &Block, normal: Wide3<L::F>)
     (base.max(a).max(b.max(c)), zero - low)
 }
 
-/// Number of the smallest rule for a patch at such a distance; [`RULES`] where none is exact enough.
+/// Number of the smallest rule for a patch at such a distance; [`CUBATURE_RULES`] where none is exact enough.
 #[inline(always)]
-fn rule_number<L: Lanes64>(lanes: L, least: &[f64; RULES], size: L::F, other: L::F, distance2: L::F) -> L::F {
-    let mut number = lanes.all(RULES as f64);
+fn rule_number<L: Lanes64>(
+    lanes: L,
+    least: &[f64; CUBATURE_RULES],
+    size: L::F,
+    other: L::F,
+    distance2: L::F,
+) -> L::F {
+    let mut number = lanes.all(CUBATURE_RULES as f64);
     for least in least {
         let distance = size * lanes.all(*least) + other + lanes.all(NEAREST);
         let far = distance2.gt(distance * distance);

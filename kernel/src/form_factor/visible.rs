@@ -10,7 +10,7 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, clamp, sqrt, unit};
 
 /// Rounding of a height, as a share of the distance.
-const ON_PLANE: f64 = 2e-15;
+const HEIGHT_ROUNDING: f64 = 2e-15;
 
 /// Corners of a stored piece: a triangle cut at the polygon's plane has four sides, and a piece that they cut
 /// grows by one corner each, to what a [`Convex`] holds.
@@ -21,10 +21,10 @@ const SHALLOWEST: u32 = 6;
 
 /// So many times more where patches are larger than the target is high above them: two resolutions of a narrow gap agree
 /// by chance.
-const NEAR: u32 = 4;
+const NEAR_RESOLUTION_FACTOR: u32 = 4;
 
 /// Times that a patch of the receiver is halved, at most.
-const DEEPEST: u32 = 26;
+const RECEIVER_HALVINGS_MOST: u32 = 26;
 
 /// A value with the error that comes with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,12 +134,16 @@ fn visible(
 }
 
 /// The most parts of a receiver.
-const PARTS: usize = if cfg!(feature = "std") { 64 } else { 8 };
+const RECEIVER_PARTS_MOST: usize = if cfg!(feature = "std") { 64 } else { 8 };
 
 /// Cuts a receiver along the lines in which occluders stand on its plane or pass it: what is visible jumps there.
 #[inline(never)]
-fn cut_along_traces(receiver: &Convex, normal: Vec3, occluders: &[[Vec3; 3]]) -> ([Convex; PARTS], usize) {
-    let (mut parts, mut count) = ([Convex::EMPTY; PARTS], 1);
+fn cut_along_traces(
+    receiver: &Convex,
+    normal: Vec3,
+    occluders: &[[Vec3; 3]],
+) -> ([Convex; RECEIVER_PARTS_MOST], usize) {
+    let (mut parts, mut count) = ([Convex::EMPTY; RECEIVER_PARTS_MOST], 1);
     parts.set(0, *receiver);
     let Some(base) = receiver.corners().first() else { return (parts, 0) };
     for occluder in occluders {
@@ -158,7 +162,11 @@ fn cut_along_traces(receiver: &Convex, normal: Vec3, occluders: &[[Vec3; 3]]) ->
         for at in 0..before {
             let Some(part) = parts.get(at).copied() else { continue };
             let [one, other] = [part.clip(beside, tolerance), part.clip(|c| -beside(c), tolerance)];
-            if one.is_empty() || other.is_empty() || count == PARTS || part.corners().len() + 2 > CAPACITY {
+            if one.is_empty()
+                || other.is_empty()
+                || count == RECEIVER_PARTS_MOST
+                || part.corners().len() + 2 > CAPACITY
+            {
                 continue;
             }
             parts.set(at, one);
@@ -183,10 +191,10 @@ impl Shadow {
     /// where it is seen edge-on or lies beyond that plane.
     fn new(triangle: &[Vec3; 3], normal: Vec3, distance: f64) -> Option<Shadow> {
         let reach = sqrt(triangle.iter().fold(0.0, |m: f64, c| m.max(c.length_squared())));
-        let tolerance = ON_PLANE * reach.max(distance);
+        let tolerance = HEIGHT_ROUNDING * reach.max(distance);
         let before = Convex::new(triangle).clip(|c| distance - c.dot(normal), tolerance);
         let facing = before.corners().first()?.dot(unit(double_area(triangle))?);
-        if facing.abs() <= ON_PLANE * reach {
+        if facing.abs() <= HEIGHT_ROUNDING * reach {
             return None;
         }
         let mut normals = Convex::EMPTY;
@@ -251,7 +259,7 @@ impl Pieces<'_> {
                 break;
             };
             let reach = piece.corners().iter().fold(0.0, |m: f64, c| m.max(c.abs().max_element()));
-            let tolerance = ON_PLANE * reach;
+            let tolerance = HEIGHT_ROUNDING * reach;
             if shadow.hidden(&piece, tolerance).is_empty() {
                 index += 1;
                 continue;
@@ -301,13 +309,13 @@ impl Mean<'_> {
     /// each may differ by the tolerance times its own length's share. Along an outline the difference falls by
     /// 2.8 a halving and is shared by two: less than a quarter of the parent's is taken for chance.
     fn refined(&mut self, whole: &Patch, coarse: f64) -> Result<Estimate, Error> {
-        let mut halvings = [Halving::default(); DEEPEST as usize];
+        let mut halvings = [Halving::default(); RECEIVER_HALVINGS_MOST as usize];
         let (mut path, mut patch, mut coarse, mut parent) =
             (HalvingPath::default(), *whole, coarse, f64::INFINITY);
         // two halvings halve the size
         let (mut shallowest, mut square) = (SHALLOWEST, whole.size() * whole.size());
         square /= f64::from(1u32 << SHALLOWEST);
-        while 4.0 * square > self.height * self.height && shallowest < SHALLOWEST + NEAR {
+        while 4.0 * square > self.height * self.height && shallowest < SHALLOWEST + NEAR_RESOLUTION_FACTOR {
             (shallowest, square) = (shallowest + 1, 0.5 * square);
         }
         loop {
@@ -316,7 +324,7 @@ impl Mean<'_> {
             let error = difference.max(0.25 * parent);
             let within = error <= self.tolerance * patch.size() / sqrt(self.size);
             let depth = path.depth();
-            if !(within && depth >= shallowest) && path.down(DEEPEST) {
+            if !(within && depth >= shallowest) && path.down(RECEIVER_HALVINGS_MOST) {
                 halvings.set(depth as usize, Halving { difference, high, ..Halving::default() });
                 (patch, coarse, parent) = (patch.half(false), low, difference);
                 continue;

@@ -49,7 +49,7 @@ plain_struct! {
         pub spans: u32,
         /// 1 where the part's span shows the sky.
         pub sky: u32,
-        /// What the part's rays are: [`EVEN`], [`NODES`], [`GRADED`] or [`PAPER`].
+        /// What the part's rays are: [`FORK_MIDPOINTS`], [`NODES`], [`GRADED`] or [`PAPER`].
         pub kind: u32,
         /// Points asked of the part's rule.
         pub wanted: u32,
@@ -59,7 +59,7 @@ plain_struct! {
 }
 
 /// Midpoints of equal shares.
-const EVEN: u32 = 0;
+const FORK_MIDPOINTS: u32 = 0;
 /// Gauss nodes.
 const NODES: u32 = 1;
 /// Gauss nodes that crowd at both ends.
@@ -100,7 +100,7 @@ impl Fork {
                 (fork.kind, fork.rays) = (PAPER, 3);
             }
             RaySet::Gauss(counts) => fork.ask(NODES, fork.count(counts)),
-            RaySet::Equal(counts) => (fork.kind, fork.rays) = (EVEN, fork.count(counts)),
+            RaySet::Equal(counts) => (fork.kind, fork.rays) = (FORK_MIDPOINTS, fork.count(counts)),
             RaySet::Split(counts) => match sweep() {
                 Some(spans) => fork.spans = spans as u32,
                 None => fork.ask(NODES, fork.count(counts)),
@@ -164,7 +164,7 @@ impl Fork {
             let [low, high] = self.part;
             let (n, width) = (self.wanted as usize, high - low);
             let (x, share) = match self.kind {
-                EVEN => {
+                FORK_MIDPOINTS => {
                     let n = f64::from(self.rays);
                     ((number as f64 + 0.5) / n, 0.5 * width / n)
                 }

@@ -85,7 +85,7 @@ impl PlaneScene<'_> {
 }
 
 /// No chain is longer, whatever its reflectances.
-const LONGEST: u32 = 100_000;
+const PLANE_CHAIN_MOST: u32 = 100_000;
 impl Chains<'_> {
     /// Follows a ray and all that its reflections make of it.
     pub fn follow<S: Sink>(&self, leg: PathState, sink: &mut S, scratch: &mut Scratch<'_>) {
@@ -172,7 +172,7 @@ impl Chains<'_> {
         if throughput == 0.0 || leg.depth >= self.most {
             return None;
         }
-        if throughput < leg.floor || leg.depth >= LONGEST || leg.lobes >= MOST_LOBES {
+        if throughput < leg.floor || leg.depth >= PLANE_CHAIN_MOST || leg.lobes >= MOST_LOBES {
             sink.lost(throughput);
             return None;
         }

@@ -13,7 +13,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces, span};
 use crate::base::math::{fabs, narrow};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
-use crate::coupling::word::EMPTY;
+use crate::coupling::word::STRAIGHT;
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::radiosity::System;
 use crate::scene::sky::Sky;
@@ -29,7 +29,7 @@ const LINEAR: f64 = 11.0 / 3.0;
 const DEPARTURE: f64 = 2.0;
 
 /// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
-pub const UNSEEN: f64 = 0.5;
+pub const ROW_UNSEEN_RAYS: f64 = 0.5;
 
 /// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
 const MOST_CARRIED: u32 = 12;
@@ -157,7 +157,7 @@ pub fn rows(
     check(out.len(), span(&range))?;
     let mut sums = [0.0; MAX_BANDS];
     let sums = sums.head_mut(bands);
-    let unseen = if is_dark(system) { 0.0 } else { UNSEEN };
+    let unseen = if is_dark(system) { 0.0 } else { ROW_UNSEEN_RAYS };
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
         let near = system.stand_in(unknown, &row);
         let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
@@ -200,7 +200,7 @@ fn about_mean<L: Lanes>(
 ) {
     let bands = sums.len();
     let (mut met, mut checks) = (0.0, [0.0; 4]);
-    for record in row.targets.iter().filter(|record| record.word() == EMPTY) {
+    for record in row.targets.iter().filter(|record| record.word() == STRAIGHT) {
         met += record.weight;
         checks.iter_mut().zip(record.checks).for_each(|(sum, c)| *sum += f64::from(c));
     }
@@ -210,7 +210,7 @@ fn about_mean<L: Lanes>(
     let mut means = [0.0; MAX_BANDS];
     row.gather(radiance, means.head_mut(bands));
     if let Some(sky) = &system.light.sky {
-        for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.word, BLOCKED | EMPTY)) {
+        for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.word, BLOCKED | STRAIGHT)) {
             sky.sum(lanes, bundle.packed, light);
             let seen = light.iter().zip(row.products(bundle.word));
             means.iter_mut().zip(seen).for_each(|(mean, (l, p))| *mean += bundle.weight * l * p);
@@ -250,7 +250,7 @@ fn add_sky<L: Lanes>(
     sums: &mut [[f64; 4]],
 ) {
     for bundle in row.escapes {
-        if known && matches!(bundle.word, BLOCKED | EMPTY) {
+        if known && matches!(bundle.word, BLOCKED | STRAIGHT) {
             continue;
         }
         sky.sum(lanes, bundle.packed, light);

@@ -14,7 +14,7 @@ use crate::base::qmc::{Sequence, hash2, triangle};
 use crate::coupling::element::Elements;
 use crate::coupling::rows::lobe_point;
 use crate::coupling::sink::Sink;
-use crate::coupling::word::EMPTY;
+use crate::coupling::word::STRAIGHT;
 use crate::coupling::{Coupling, Record, Row, TRACED};
 use crate::radiosity::direct::Shape;
 use crate::radiosity::sun_image::{Noting, pack};
@@ -37,7 +37,7 @@ pub struct BeamSettings {
 }
 
 /// Fewest and most rays of one facet.
-const RAYS: (f64, f64) = (16.0, 65536.0);
+const FACET_BEAM_RAYS: (f64, f64) = (16.0, 65536.0);
 
 impl BeamSettings {
     /// About `rays` rays in all, spread over the mirrors that face the sun by the area that it sees.
@@ -58,7 +58,8 @@ const FOLD: usize = 1024;
 /// About the records that one row needs while it grows: two for each ray, or twice as many as there are different ones.
 pub fn unmerged(scene: &Scene<'_>, elements: &Elements<'_>, settings: &BeamSettings) -> usize {
     let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
-    let rays = (clamp(largest * settings.density, RAYS.0, RAYS.1) as usize).next_power_of_two();
+    let rays = (clamp(largest * settings.density, FACET_BEAM_RAYS.0, FACET_BEAM_RAYS.1) as usize)
+        .next_power_of_two();
     (2 * rays).min(FOLD + elements.unknowns().saturating_mul(8))
 }
 
@@ -114,15 +115,21 @@ impl Tracer<'_, '_> {
             self.sink.end_row(Row::default(), Some, Record::join_beam);
             return Some(());
         }
-        let wanted = clamp(area * self.settings.density, RAYS.0, RAYS.1);
+        let wanted = clamp(area * self.settings.density, FACET_BEAM_RAYS.0, FACET_BEAM_RAYS.1);
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
         let mut fold = FOLD;
-        for first in (0..rays).step_by(BATCH) {
-            let end = rays.min(first + BATCH as u32);
-            for start in (first..end).step_by(GROUP) {
-                self.rays(facet, side, &sequence, start..end.min(start + GROUP as u32), &mut stats)?;
+        for first in (0..rays).step_by(BEAM_RAYS_UNMERGED) {
+            let end = rays.min(first + BEAM_RAYS_UNMERGED as u32);
+            for start in (first..end).step_by(BEAM_RAYS_TOGETHER) {
+                self.rays(
+                    facet,
+                    side,
+                    &sequence,
+                    start..end.min(start + BEAM_RAYS_TOGETHER as u32),
+                    &mut stats,
+                )?;
             }
             if self.sink.present() >= fold {
                 fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
@@ -134,7 +141,7 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    /// The rays of these numbers, at most [`GROUP`], from mirror to mirror together.
+    /// The rays of these numbers, at most [`BEAM_RAYS_TOGETHER`], from mirror to mirror together.
     fn rays(
         &mut self,
         facet: usize,
@@ -144,8 +151,8 @@ impl Tracer<'_, '_> {
         stats: &mut Row,
     ) -> Option<()> {
         let (scene, bvh) = (self.scene, self.bvh);
-        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); GROUP];
-        let mut chains: [Option<Chain>; GROUP] = [None; GROUP];
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BEAM_RAYS_TOGETHER];
+        let mut chains: [Option<Chain>; BEAM_RAYS_TOGETHER] = [None; BEAM_RAYS_TOGETHER];
         let mut count = 0;
         for index in numbers {
             let (p, q) = sequence.pair(index, 0);
@@ -155,7 +162,7 @@ impl Tracer<'_, '_> {
             let toward = self.sun.sample(s, t);
             if toward.dot(surface.normal) > 0.0 {
                 // flux per unit of normal irradiance, the first cosine still to come
-                let (flux, word, arrival) = (scene.areas().at(facet), EMPTY, None);
+                let (flux, word, arrival) = (scene.areas().at(facet), STRAIGHT, None);
                 let axis = Some(-self.sun.direction());
                 let chain =
                     Chain { index, surface, mirror: facet, direction: -toward, flux, word, arrival, axis };
@@ -164,12 +171,12 @@ impl Tracer<'_, '_> {
                 count += 1;
             }
         }
-        let mut hidden = [false; GROUP];
+        let mut hidden = [false; BEAM_RAYS_TOGETHER];
         bvh.occluded_many(rays.head(count), hidden.head_mut(count));
         for (chain, _) in chains.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden) {
             *chain = None;
         }
-        let mut hits = [None; GROUP];
+        let mut hits = [None; BEAM_RAYS_TOGETHER];
         while count > 0 {
             let mut left = 0;
             for at in 0..count {
@@ -235,10 +242,10 @@ impl Tracer<'_, '_> {
 }
 
 /// Rays of a mirror after which records are folded.
-const BATCH: usize = 32;
+const BEAM_RAYS_UNMERGED: usize = 32;
 
 /// Rays that are traced together: they wait on the stack, which is small where there is no standard library.
-const GROUP: usize = if cfg!(feature = "std") { BATCH } else { 1 };
+const BEAM_RAYS_TOGETHER: usize = if cfg!(feature = "std") { BEAM_RAYS_UNMERGED } else { 1 };
 
 /// Sunlight on its way from mirror to mirror.
 #[derive(Clone, Copy)]

@@ -9,7 +9,7 @@ use crate::base::math::{PI, Vec3};
 use crate::base::qmc::{Sequence, hash2, triangle};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
-use crate::coupling::word::EMPTY;
+use crate::coupling::word::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::radiosity::straight::{Blocked, Straight};
 use crate::rays::bvh::Bvh;
@@ -150,7 +150,7 @@ fn add_escapes<L: Lanes>(
 ) {
     let bands = sum.len();
     for bundle in row.escapes {
-        if scale.is_some() && matches!(bundle.word, BLOCKED | EMPTY) {
+        if scale.is_some() && matches!(bundle.word, BLOCKED | STRAIGHT) {
             continue;
         }
         sky.sum(lanes, bundle.packed, sum);

@@ -3,13 +3,13 @@
 use crate::base::error::{Error, Field};
 use crate::scene::light::Light;
 use crate::scene::lobe::Lobe;
-use crate::scene::sky::LARGEST;
+use crate::scene::sky::RADIANCE_LARGEST;
 use crate::scene::sun::Sun;
 use crate::scene::{MAX_BANDS, Scene};
 
 /// Refuses radiances above 1e37: f32 images hold 3.4e38, and a ninth of that leaves room for sums along a chain.
 pub fn check_radiance(radiance: &[f64], bands: usize) -> Result<(), Error> {
-    match radiance.iter().enumerate().find(|(_, l)| l.is_nan() || **l > LARGEST) {
+    match radiance.iter().enumerate().find(|(_, l)| l.is_nan() || **l > RADIANCE_LARGEST) {
         Some((at, &value)) => Err(Error::Range { field: Field::Emission, band: at % bands.max(1), value }),
         None => Ok(()),
     }
@@ -22,7 +22,7 @@ pub fn check_radiance(radiance: &[f64], bands: usize) -> Result<(), Error> {
 pub fn check_highlights(scene: &Scene<'_>, light: &Light<'_>) -> Result<(), Error> {
     let Some(sun) = &light.sun else { return Ok(()) };
     for band in 0..scene.bands() {
-        if highlight(scene, sun, band) > LARGEST {
+        if highlight(scene, sun, band) > RADIANCE_LARGEST {
             return Err(Error::Range { field: Field::SunIrradiance, band, value: sun.irradiance(band) });
         }
     }

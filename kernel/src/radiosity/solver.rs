@@ -18,7 +18,7 @@ use crate::radiosity::sweeps;
 use crate::scene::{MAX_BANDS, Scene};
 
 /// Solutions that [`History`] keeps.
-const KEPT: usize = 3;
+const HISTORY_SOLUTIONS: usize = 3;
 
 /// More plain sweeps than this are not made where faster ones may be.
 const PLAIN: u32 = 48;
@@ -28,11 +28,11 @@ const PLAIN: u32 = 48;
 const MATRIX_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
 /// The most sweeps of the faster kind.
-const MOST: u32 = 1000;
+const SWEEPS_MOST: u32 = 1000;
 
 /// Blocks of Chebyshev's sweeps and where their interval ends: the few modes beyond are left to the extrapolation. The
 /// next one is taken where a block did not bring [`PROGRESS`].
-const BLOCKS: [(u32, f64); 4] = [(16, 0.9), (32, 0.97), (64, 0.99), (128, 0.999)];
+const CHEBYSHEV_BLOCKS: [(u32, f64); 4] = [(16, 0.9), (32, 0.97), (64, 0.99), (128, 0.999)];
 
 /// A block is to shrink the change of a sweep to this share.
 const PROGRESS: f64 = 0.05;
@@ -41,7 +41,7 @@ const PROGRESS: f64 = 0.05;
 const STUCK: f64 = 0.5;
 
 /// Rows that sum to this or more cannot be told from closed ones.
-const CLOSED: f64 = 1.0 - 1e-12;
+const CLOSED_ROW_SUM: f64 = 1.0 - 1e-12;
 
 /// Solutions' worth of memory that [`History`] needs beside the two that plain sweeps work on: 0 where the scene's
 /// reflectances need no faster ones.
@@ -49,7 +49,7 @@ pub fn kept(scene: &Scene<'_>, goal: f64, max_bounces: Option<u32>) -> usize {
     // mirrors of at most s bring at most 1 + s + s^2 + ... times a row's share of the hemisphere
     let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
     let few = sweeps(q.min(1.0), goal) <= PLAIN;
-    if few || max_bounces.is_some() { 0 } else { KEPT + 1 }
+    if few || max_bounces.is_some() { 0 } else { HISTORY_SOLUTIONS + 1 }
 }
 
 /// Share of the goal that the faster sweeps go on to: they are for rooms that shine many times brighter than what lights them,
@@ -88,8 +88,8 @@ struct Pace {
 
 impl Pace {
     fn new(q: f64) -> Pace {
-        let plain = KEPT as u32 + 1;
-        let interval = q.min(BLOCKS[0].1);
+        let plain = HISTORY_SOLUTIONS as u32 + 1;
+        let interval = q.min(CHEBYSHEV_BLOCKS[0].1);
         Pace { plain, left: 0, omega: 1.0, interval, block: 0, slow: false, before: f64::INFINITY }
     }
 
@@ -101,7 +101,7 @@ impl Pace {
             self.omega = if self.omega == 1.0 { 1.0 / (1.0 - 0.5 * squared) } else { 1.0 / next };
             self.left = self.left.saturating_sub(1);
             if self.left == 0 || near {
-                (self.plain, self.omega) = (KEPT as u32 + 1, 1.0);
+                (self.plain, self.omega) = (HISTORY_SOLUTIONS as u32 + 1, 1.0);
             }
             return true;
         }
@@ -110,15 +110,15 @@ impl Pace {
             return true;
         }
         if change > PROGRESS * self.before {
-            if change > STUCK * self.before && self.block + 1 == BLOCKS.len() {
+            if change > STUCK * self.before && self.block + 1 == CHEBYSHEV_BLOCKS.len() {
                 if self.slow {
                     return false;
                 }
                 self.slow = true;
             }
-            self.block = (self.block + 1).min(BLOCKS.len() - 1);
+            self.block = (self.block + 1).min(CHEBYSHEV_BLOCKS.len() - 1);
         }
-        let (length, end) = BLOCKS.get(self.block).copied().unwrap_or_default();
+        let (length, end) = CHEBYSHEV_BLOCKS.get(self.block).copied().unwrap_or_default();
         self.interval = if self.slow { 0.0 } else { q.min(end) };
         (self.left, self.before) = (length, change);
         true
@@ -135,7 +135,7 @@ impl Solver {
         // a sweep adds a reflection, and so does what sees the radiances
         let most = match max_bounces {
             Some(bounces) => bounces.saturating_sub(1),
-            None if fast => MOST,
+            None if fast => SWEEPS_MOST,
             None => needed.saturating_add(200).min(100_000),
         };
         let pace = fast.then(|| Pace::new(q));
@@ -147,12 +147,12 @@ impl Solver {
     /// anywhere.
     pub fn unit() -> Solver {
         let pace = Some(Pace::new(1.0));
-        Solver { done: 0, error: f64::INFINITY, q: 1.0, inverse: 1.0, goal: 0.5, most: MOST, pace }
+        Solver { done: 0, error: f64::INFINITY, q: 1.0, inverse: 1.0, goal: 0.5, most: SWEEPS_MOST, pace }
     }
 
     /// True where a contraction bounds nothing, and [`Solver::unit`] has to.
     pub fn is_closed(q: f64, max_bounces: Option<u32>) -> bool {
-        q >= CLOSED && max_bounces.is_none()
+        q >= CLOSED_ROW_SUM && max_bounces.is_none()
     }
 
     /// True where another sweep is wanted.
@@ -202,7 +202,7 @@ impl Solver {
     pub fn inverse(&self, solution: &[f64], row_sum: f64) -> Result<f64, Error> {
         let (low, high) = solution.iter().fold((0.0, 0.0), |(a, b), &v| (f64::min(a, v), f64::max(b, v)));
         // beyond, a sweep's increase of 1 drowns in rounding
-        if self.error <= self.goal && low >= 0.0 && high < 1.0 / (1.0 - CLOSED) {
+        if self.error <= self.goal && low >= 0.0 && high < 1.0 / (1.0 - CLOSED_ROW_SUM) {
             Ok(high.max(1.0) / (1.0 - self.error.max(0.0)))
         } else {
             Err(Error::Diverges { row_sum })
@@ -231,10 +231,10 @@ impl<'m> History<'m> {
     /// `weight` of each value: the element's area over rho_d, so that sums are fluxes.
     pub fn note(&mut self, old: &[f64], new: &mut [f64], bands: usize, weight: impl Fn(usize) -> f64) {
         let size = old.len();
-        if self.solutions.len() < KEPT * size {
+        if self.solutions.len() < HISTORY_SOLUTIONS * size {
             return;
         }
-        if self.filled < KEPT {
+        if self.filled < HISTORY_SOLUTIONS {
             let slot = self.solutions.iter_mut().skip(self.filled * size).take(size);
             slot.zip(old).for_each(|(to, from)| *to = *from);
             self.filled += 1;
@@ -267,7 +267,7 @@ impl<'m> History<'m> {
             [new - x, x - c, c - b, b - a]
         };
         let steps = |d: [f64; 4]| [d[0] - d[1], d[1] - d[2], d[2] - d[3]];
-        let (mut gram, mut right) = ([[0.0; KEPT]; KEPT], [0.0; KEPT]);
+        let (mut gram, mut right) = ([[0.0; HISTORY_SOLUTIONS]; HISTORY_SOLUTIONS], [0.0; HISTORY_SOLUTIONS]);
         for (at, &value) in new.iter().enumerate().skip(band).step_by(bands.max(1)) {
             let d = changes(at, value);
             let columns = steps(d);
@@ -297,11 +297,14 @@ impl<'m> History<'m> {
 }
 
 /// Solves the normal equations by elimination; what depends on those before, to rounding, is left out.
-fn least_squares(mut gram: [[f64; KEPT]; KEPT], mut right: [f64; KEPT]) -> [f64; KEPT] {
+fn least_squares(
+    mut gram: [[f64; HISTORY_SOLUTIONS]; HISTORY_SOLUTIONS],
+    mut right: [f64; HISTORY_SOLUTIONS],
+) -> [f64; HISTORY_SOLUTIONS] {
     /// A column that the others explain to 1e-5 of its length says nothing of its own.
     const DEPENDENT: f64 = 1e-10;
     let squares = [gram[0][0], gram[1][1], gram[2][2]];
-    let mut used = [false; KEPT];
+    let mut used = [false; HISTORY_SOLUTIONS];
     for (k, (used, square)) in used.iter_mut().zip(squares).enumerate() {
         let row = gram.at(k);
         let (pivot, own) = (row.at(k), right.at(k));
@@ -315,8 +318,8 @@ fn least_squares(mut gram: [[f64; KEPT]; KEPT], mut right: [f64; KEPT]) -> [f64;
             *right -= factor * own;
         }
     }
-    let mut theta = [0.0; KEPT];
-    for k in (0..KEPT).rev().filter(|&k| used.at(k)) {
+    let mut theta = [0.0; HISTORY_SOLUTIONS];
+    for k in (0..HISTORY_SOLUTIONS).rev().filter(|&k| used.at(k)) {
         let row = gram.at(k);
         let rest: f64 = row.iter().zip(theta).skip(k + 1).map(|(m, t)| m * t).sum();
         let value = (right.at(k) - rest) / row.at(k);
@@ -340,7 +343,7 @@ mod tests {
         if solver.goal == 0.5 {
             x.fill(0.0);
         }
-        let mut memory = std::vec![0.0; (KEPT + 1) * n];
+        let mut memory = std::vec![0.0; (HISTORY_SOLUTIONS + 1) * n];
         memory.iter_mut().zip(g).for_each(|(d, row)| *d = 1.0 - row.iter().sum::<f64>());
         let mut history = History::new(&mut memory, n);
         while solver.more() {

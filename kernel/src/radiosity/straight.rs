@@ -9,7 +9,7 @@ use crate::base::index::{Index, IndexMut, copy, pieces, span};
 use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
 use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
-use crate::coupling::word::EMPTY;
+use crate::coupling::word::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, Row, RowView, TRACED};
 use crate::rays::bvh::Bvh;
 use crate::rays::outline::{Basis, Candidates, OpenSky};
@@ -35,7 +35,7 @@ pub fn deepest(all_irradiances: bool) -> u32 {
 const MOST_SCALE: f64 = 2.0;
 
 /// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
-pub const SAME: f64 = 1e-6;
+pub const BLOCKED_ROUNDING: f64 = 1e-6;
 
 /// Mean square departure of what is blocked from a linear function, in squares of the goal, from which on quarters are cut
 /// again.
@@ -81,7 +81,7 @@ impl<'a> Straight<'a> {
         match self.of(unknown, bands) {
             Some((values, _)) if row.state >= TRACED && row.blocked > 0.0 => {
                 let blocked = values.at(3 * bands);
-                if fabs(blocked - row.blocked) < SAME {
+                if fabs(blocked - row.blocked) < BLOCKED_ROUNDING {
                     return 1.0;
                 }
                 clamp(blocked / row.blocked, 1.0 / MOST_SCALE, MOST_SCALE)
@@ -100,7 +100,7 @@ impl<'a> Straight<'a> {
         }
         let scale = self.scale(unknown, bands, &row.row);
         let mut short = [a, b];
-        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.word, BLOCKED | EMPTY)) {
+        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.word, BLOCKED | STRAIGHT)) {
             // what is open has the other sign
             let sign = if bundle.word == BLOCKED && row.row.state != ENCLOSED { -scale } else { scale };
             let sign = sign * bundle.rays();
@@ -236,8 +236,8 @@ fn row(
     }
     let row = of.coupling.row(unknown);
     let hidden = fit.mean(bands);
-    let least = row.blocked / MOST_SCALE - SAME;
-    if row.state >= TRACED && !(least..=row.blocked * MOST_SCALE + SAME).contains(&hidden) {
+    let least = row.blocked / MOST_SCALE - BLOCKED_ROUNDING;
+    if row.state >= TRACED && !(least..=row.blocked * MOST_SCALE + BLOCKED_ROUNDING).contains(&hidden) {
         // the row's rays have missed what hides the sky: nothing says what comes from there
         return None;
     }

@@ -17,7 +17,7 @@ use crate::radiosity::direct::Shape;
 const ROOM: (usize, usize) = (1 << 14, 2);
 
 /// The most images of one side: each is looked for from every point.
-const MOST: usize = 1024;
+const SIDE_IMAGES_MOST: usize = 1024;
 
 /// Images for which `sides` sides of facets have room.
 fn room(sides: usize) -> usize {
@@ -69,7 +69,7 @@ impl Mirrors {
 }
 
 /// Where a side's list would begin: it has too many images.
-const MANY: u64 = u64::MAX;
+const SIDE_IMAGES_TOO_MANY: u64 = u64::MAX;
 
 /// The places of one side's list from its beginning, which holds the number of an image, counted from 1; 0: no more.
 #[derive(Clone, Debug)]
@@ -83,8 +83,8 @@ struct List<'a> {
 impl<'a> List<'a> {
     /// Images, and where the mirrors stand that show them.
     fn of(slots: &'a [u64], sides: usize, side: usize) -> List<'a> {
-        let next = slots.get(side).copied().filter(|next| *next != MANY).unwrap_or(0);
-        List { slots, sides, next, left: MOST }
+        let next = slots.get(side).copied().filter(|next| *next != SIDE_IMAGES_TOO_MANY).unwrap_or(0);
+        List { slots, sides, next, left: SIDE_IMAGES_MOST }
     }
 }
 
@@ -169,32 +169,32 @@ fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
 }
 
 /// Suns this close to each other (1 - cosine; 1.4e-7 rad) are one: directions are kept to 2e-9.
-pub const SAME: f64 = 1e-14;
+pub const SUN_DISTANCE_LEAST: f64 = 1e-14;
 
 /// Directions of one image by way of different facets are this close together (1 - cosine): some roundings of 2e-9 rad
-/// beyond [`SAME`].
-const SEEN: f64 = 2.0 * SAME;
+/// beyond [`SUN_DISTANCE_LEAST`].
+const SEEN: f64 = 2.0 * SUN_DISTANCE_LEAST;
 
 /// Longest distance between two points of a scene, at most, in scene coordinates.
 const SCENE_DIAMETER: f64 = 4.0;
 
 /// Bits of each coordinate of a direction.
-const BITS: u32 = 31;
+const IMAGE_DIRECTION_BITS: u32 = 31;
 
 /// The largest coordinate.
-const LAST_STEP: u64 = (1 << BITS) - 1;
+const LAST_STEP: u64 = (1 << IMAGE_DIRECTION_BITS) - 1;
 
 /// Directions within [`SEEN`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
 const NEAR_STEPS: i64 = 512;
 
 /// A direction in 63 bits, to 2e-9 rad; never 0.
 pub fn pack(direction: Vec3) -> u64 {
-    1 << 62 | octahedron::pack::<BITS>(direction)
+    1 << 62 | octahedron::pack::<IMAGE_DIRECTION_BITS>(direction)
 }
 
 /// The direction of a packed one.
 pub fn unpack(packed: u64) -> Vec3 {
-    octahedron::unpack::<BITS>(packed & !(1 << 62))
+    octahedron::unpack::<IMAGE_DIRECTION_BITS>(packed & !(1 << 62))
 }
 
 /// The images that each side of a facet sees, and what they give its elements on the mean.
@@ -262,7 +262,7 @@ pub struct Noting<'a> {
 pub const SPREAD: usize = 10;
 
 /// Mean of the squared distance of an element's points from its middle, in local coordinates a^2 + a b + b^2.
-const EVEN: f64 = 1.0 / 12.0;
+const ELEMENT_SPREAD2: f64 = 1.0 / 12.0;
 
 /// Expected squared error of the irradiance over pi of an unknown, relative to the reference radiance, where light that is
 /// not the same all over its element counts as a mean: `spread` are its values, of which images count where they are not
@@ -281,12 +281,12 @@ pub fn variance(spread: &[f32], known: bool) -> f64 {
     }
     let (a, b) = (a / sum, b / sum);
     let apart = square / sum - (a * a + a * b + b * b);
-    let share = clamp(apart / EVEN, 1.0 / (SMALLEST * count + 1.0), 1.0);
+    let share = clamp(apart / ELEMENT_SPREAD2, 1.0 / (IMAGE_SHARE_LEAST * count + 1.0), 1.0);
     sum * sum * (1.0 / share - 1.0 + 1.0 / (count * sqrt(count)))
 }
 
 /// Rays that all fall on one place of an element: they are said to fill one over so many of them.
-const SMALLEST: f64 = 16.0;
+const IMAGE_SHARE_LEAST: f64 = 16.0;
 
 impl Noting<'_> {
     /// Notes an image in the direction `packed` for one of `sides` sides of facets, that a `mirror` shows.
@@ -299,7 +299,7 @@ impl Noting<'_> {
             // of this image where the list goes on
             last = sides + IMAGE_PLACES * ((self.slots.at(last) & NEXT_MASK) as usize) - 1;
             let axis = unpack(other);
-            if 1.0 - axis.dot(direction) < SAME {
+            if 1.0 - axis.dot(direction) < SUN_DISTANCE_LEAST {
                 let (middle, radius) = disc(axis);
                 let next = self.slots.at(last) & NEXT_MASK;
                 self.slots.set(last, next | u64::from(region.with(middle, radius).0) << 32);
@@ -308,12 +308,12 @@ impl Noting<'_> {
             }
             count = number + 1;
         }
-        if count == 0 && self.slots.at(last) == MANY {
+        if count == 0 && self.slots.at(last) == SIDE_IMAGES_TOO_MANY {
             return;
         }
         let used = self.slots.at(sides) as usize;
-        if count >= MOST || used >= room(sides) {
-            self.slots.set(side, MANY);
+        if count >= SIDE_IMAGES_MOST || used >= room(sides) {
+            self.slots.set(side, SIDE_IMAGES_TOO_MANY);
             return;
         }
         let (middle, radius) = disc(direction);
@@ -397,7 +397,7 @@ impl<'a> SunImages<'a> {
     /// Whether [`SunImages::of`] gives all images that one of `sides` sides of facets may see; else their light stays a mean.
     #[inline]
     pub fn are_known(&self, side: usize) -> bool {
-        self.slots.is_empty() || self.slots.at(side) != MANY
+        self.slots.is_empty() || self.slots.at(side) != SIDE_IMAGES_TOO_MANY
     }
 
     /// Whether one of `sides` sides of facets may see an image in the direction `axis`: where its images are known, one of
@@ -407,7 +407,7 @@ impl<'a> SunImages<'a> {
             return true;
         }
         // most differ in their bits already; at the rims of the octahedron's square, those do not tell
-        let places = |packed: u64| [packed >> BITS, packed].map(|x| (x & LAST_STEP) as i64);
+        let places = |packed: u64| [packed >> IMAGE_DIRECTION_BITS, packed].map(|x| (x & LAST_STEP) as i64);
         let near = places(pack(axis));
         let rim = near.iter().any(|x| !(NEAR_STEPS..=LAST_STEP as i64 - NEAR_STEPS).contains(x));
         let may_be = |packed: u64| {
@@ -463,7 +463,7 @@ mod tests {
         for x in [0.0, 0.1, 0.1, 0.0, 0.2] {
             noting.note(sides, 1, pack(Vec3::new(x, 0.0, 1.0).normalize()), 0);
         }
-        for x in 0..MOST + 3 {
+        for x in 0..SIDE_IMAGES_MOST + 3 {
             noting.note(sides, 2, pack(Vec3::new(1e-3 * x as f64, 0.0, 1.0).normalize()), 0);
             noting.note(sides, 1, pack(Vec3::new(0.2, 0.0, 1.0).normalize()), 0);
         }

@@ -27,8 +27,8 @@ use crate::rays::ray::{self, Hit, Ray};
 use build::{Binary, Facets};
 use external::External;
 
-pub use external::{AnswerBuffer, BATCH, Intersector, NO_FACET};
-pub(crate) use stream::GROUP;
+pub use external::{AnswerBuffer, INTERSECTOR_RAYS_MOST, Intersector, NO_FACET};
+pub(crate) use stream::STREAM_RAYS;
 pub(crate) use within::HalfSpace;
 
 /// Eight child boxes of a node: axis, then 0 the low and 1 the high side, then child. No child: low is infinity
@@ -45,14 +45,14 @@ type Slack = [f32; 8];
 type Solid = [[f64; 3]; 4];
 
 /// A child with this bit is a leaf: the packet's index, and [`PAIR`] where the leaf goes on in the next packet.
-const LEAF: u32 = 1 << 31;
+const LEAF_CHILD: u32 = 1 << 31;
 const PAIR: u32 = 1 << 30;
 
 /// No facet: fills the lanes of packets that hold none.
-const NONE: u32 = u32::MAX;
+const NO_LANE_FACET: u32 = u32::MAX;
 
 /// Facets a leaf holds at most, and the width of a packet.
-const LANES: usize = 8;
+const PACKET_LANES: usize = 8;
 
 /// Levels of the deepest tree.
 const MOST_LEVELS: usize = 32;
@@ -61,13 +61,13 @@ const MOST_LEVELS: usize = 32;
 const STACK: usize = MOST_LEVELS * 7 + 1;
 
 /// Facet count is kept below this, so that lane and node numbers fit beside the bits of a child.
-const MOST: usize = 1 << 28;
+const BVH_FACETS_MOST: usize = 1 << 28;
 
 /// Coordinates up to this keep every product of the traversal finite in f32.
-const LARGEST: f64 = (1u64 << 40) as f64;
+const COORDINATE_LARGEST: f64 = (1u64 << 40) as f64;
 
 /// A largest coordinate from here on keeps them clear of f32's subnormal numbers.
-const SMALLEST: f64 = 1.0 / LARGEST;
+const COORDINATE_SMALLEST: f64 = 1.0 / COORDINATE_LARGEST;
 
 /// A mesh made ready for rays. Holds nothing but slices of the caller's memory.
 ///
@@ -78,7 +78,7 @@ pub struct Bvh<'m> {
     children: &'m [[u32; 8]],
     packets: &'m [Packet],
     slacks: &'m [Slack],
-    facets: &'m [[u32; LANES]],
+    facets: &'m [[u32; PACKET_LANES]],
     /// By facet.
     solids: &'m [Solid],
     /// Levels of nodes: bounds the stack of a traversal.
@@ -102,15 +102,15 @@ struct Size {
 
 impl Size {
     fn of(facets: usize) -> Result<Size, Error> {
-        if facets >= MOST {
-            return Err(Error::TooMany { what: "facets", limit: MOST - 1 });
+        if facets >= BVH_FACETS_MOST {
+            return Err(Error::TooMany { what: "facets", limit: BVH_FACETS_MOST - 1 });
         }
         // A node of fewer than eight children has leaves alone and at least nine facets (smaller subtrees become
         // one leaf). Let w of N nodes be such. Nodes other than the root, and leaves outside the w, are children of
         // the N - w full nodes: 8 (N - w) = N - 1 + l with 9 w + l <= n, hence N < n/7; but the root may be alone.
         let nodes = facets / 7 + 2;
         // Leaves start on a packet's boundary as long as that leaves at most as many lanes empty as are filled.
-        let packets = (2 * facets).div_ceil(LANES);
+        let packets = (2 * facets).div_ceil(PACKET_LANES);
         let tree = Binary::need(facets).bytes()?;
         let shared = tree.max(Need::new().and::<Solid>(facets).bytes()?);
         Ok(Size { nodes, packets, shared })
@@ -120,7 +120,7 @@ impl Size {
         let need = Need::new()
             .and::<Boxes>(self.nodes)
             .and::<[u32; 8]>(self.nodes)
-            .and::<[u32; LANES]>(self.packets)
+            .and::<[u32; PACKET_LANES]>(self.packets)
             .and::<Packet>(self.packets)
             .and::<Slack>(self.packets)
             .and::<u8>(self.shared);
@@ -183,7 +183,7 @@ impl<'m> Bvh<'m> {
         let scale = low.abs().max(high.abs()).max_element();
         let boxes = arena.take::<Boxes>(size.nodes)?;
         let children = arena.take::<[u32; 8]>(size.nodes)?;
-        let facets = arena.take::<[u32; LANES]>(size.packets)?;
+        let facets = arena.take::<[u32; PACKET_LANES]>(size.packets)?;
         let packets = arena.take::<Packet>(size.packets)?;
         let slacks = arena.take::<Slack>(size.packets)?;
         let shared = arena.take::<u8>(size.shared)?;
@@ -284,7 +284,7 @@ impl<'m> Bvh<'m> {
 
     /// One packet with its slacks and facets.
     #[inline(always)]
-    fn lanes(&self, packet: usize) -> Option<(&Packet, &Slack, &[u32; LANES])> {
+    fn lanes(&self, packet: usize) -> Option<(&Packet, &Slack, &[u32; PACKET_LANES])> {
         Some((self.packets.get(packet)?, self.slacks.get(packet)?, self.facets.get(packet)?))
     }
 
@@ -304,20 +304,24 @@ impl<'m> Bvh<'m> {
 fn extent(corners: &[[Vec3; 3]], areas: &[f64]) -> Result<(Vec3, Vec3), Error> {
     let mut bounds = None;
     for &corner in corners.iter().zip(areas).filter(|(_, area)| **area != 0.0).flat_map(|(facet, _)| facet) {
-        if corner.is_nan() || corner.to_array().iter().any(|&x| fabs(x) > LARGEST) {
+        if corner.is_nan() || corner.to_array().iter().any(|&x| fabs(x) > COORDINATE_LARGEST) {
             return Err(Error::Extent);
         }
         let (low, high) = bounds.unwrap_or((corner, corner));
         bounds = Some((corner.min(low), corner.max(high)));
     }
     let Some((low, high)) = bounds else { return Ok((Vec3::ZERO, Vec3::ZERO)) };
-    if low.abs().max(high.abs()).max_element() < SMALLEST { Err(Error::Extent) } else { Ok((low, high)) }
+    if low.abs().max(high.abs()).max_element() < COORDINATE_SMALLEST {
+        Err(Error::Extent)
+    } else {
+        Ok((low, high))
+    }
 }
 
 /// The facets of one packet in f32, and their slacks. Lanes without a facet are NaN, which is inside of nothing.
-fn packed(lanes: &[u32; LANES], corners: &[[Vec3; 3]]) -> (Packet, Slack) {
-    let mut packet = [[[f32::NAN; LANES]; 3]; 3];
-    let mut slack = [f32::NAN; LANES];
+fn packed(lanes: &[u32; PACKET_LANES], corners: &[[Vec3; 3]]) -> (Packet, Slack) {
+    let mut packet = [[[f32::NAN; PACKET_LANES]; 3]; 3];
+    let mut slack = [f32::NAN; PACKET_LANES];
     for (lane, &facet) in lanes.iter().enumerate() {
         let Some(facet) = corners.get(facet as usize) else { continue };
         let [a, b, c] = *facet;
@@ -327,7 +331,7 @@ fn packed(lanes: &[u32; LANES], corners: &[[Vec3; 3]]) -> (Packet, Slack) {
             }
         }
         let extent = (a.max(b).max(c) - a.min(b).min(c)).max_element();
-        slack.set(lane, (extent * traverse::SLACK) as f32);
+        slack.set(lane, (extent * traverse::LANE_EDGE_SLACK) as f32);
     }
     (packet, slack)
 }

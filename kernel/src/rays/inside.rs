@@ -5,7 +5,7 @@ use crate::rays::bvh::Bvh;
 use crate::rays::ray::Ray;
 
 /// Facets that a line may cross before it is taken to lead nowhere.
-const MOST: u32 = 64;
+const CROSSINGS_MOST: u32 = 64;
 
 /// Rays that rise by an angle of this tangent look around.
 const RISE: f64 = 0.5;
@@ -26,7 +26,7 @@ fn leaves(bvh: &Bvh<'_>, from: &Ray, direction: Vec3) -> bool {
     let Some(direction) = unit(direction) else { return false };
     let mut ray = Ray { direction, t_max: f64::INFINITY, ..*from };
     let mut left = 0;
-    for _ in 0..MOST {
+    for _ in 0..CROSSINGS_MOST {
         let Some(hit) = bvh.closest(&ray) else { return left > 0 };
         left += if hit.front { -1 } else { 1 };
         ray = Ray { origin: ray.origin + direction * hit.t, skip: hit.facet, ..ray };

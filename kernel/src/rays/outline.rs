@@ -28,10 +28,10 @@ use crate::base::simd::WIDTH;
 /// Rows of a [`Block`]: the lower end (lexicographically) and the upper one, both planes (normal and distance), the sense
 /// in which each facet runs through the edge (1: from the lower end; -1; 0 where there is none), by what each facet counts
 /// where its back shows, and the body's number.
-const ROWS: usize = 19;
+const EDGE_BLOCK_ROWS: usize = 19;
 
 /// Edges, lane by lane.
-type Block = [[f64; WIDTH]; ROWS];
+type Block = [[f64; WIDTH]; EDGE_BLOCK_ROWS];
 
 /// Centre and radius of a ball about each of some facets, lane by lane.
 type Balls = [[f32; WIDTH]; 4];
@@ -40,7 +40,7 @@ type Balls = [[f32; WIDTH]; 4];
 const BOTH: u32 = 1 << 31;
 
 /// Where there are more edges, finding those that matter to a facet costs as much as some hundreds of rays.
-const MOST_EDGES: usize = 1 << 16;
+const MESH_EDGES_MOST: usize = 1 << 16;
 
 /// The most facets of which edges are looked for: flat parts have fewer edges than facets.
 const MOST_FACETS: usize = 1 << 18;
@@ -49,10 +49,10 @@ const MOST_FACETS: usize = 1 << 18;
 const FEW_EDGES: usize = 64;
 
 /// Where memory is small there are none, and rays find what is open.
-const KEEPS: bool = cfg!(feature = "std");
+const KEEPS_OUTLINES: bool = cfg!(feature = "std");
 
 /// Facets that rise less above a point's plane (scene coordinates) lie in it: some thousand roundings of a height.
-const SLACK: f64 = 1e-12;
+const OUTLINE_HEIGHT_SLACK: f64 = 1e-12;
 
 plain_struct! {
     /// Outlines without their arrays.
@@ -80,7 +80,11 @@ impl<'m> Outlines<'m> {
 
     /// Most edges of a mesh of so many facets: a closed one has one and a half a facet.
     fn most(facets: usize) -> usize {
-        if !KEEPS || facets > MOST_FACETS { 0 } else { (2 * facets + FEW_EDGES).min(MOST_EDGES) }
+        if !KEEPS_OUTLINES || facets > MOST_FACETS {
+            0
+        } else {
+            (2 * facets + FEW_EDGES).min(MESH_EDGES_MOST)
+        }
     }
 
     /// Adds the memory of a mesh of so many facets, at most some 370 bytes each.
@@ -134,7 +138,7 @@ impl<'m> Outlines<'m> {
 
     pub(crate) fn get(view: &mut View<'m>, facets: usize) -> Result<Outlines<'m>, Error> {
         let head = view.take::<Head>(1)?.first().copied().ok_or(Error::Block)?;
-        let all = head.facets == facets as u64 && head.edges <= MOST_EDGES as u64;
+        let all = head.facets == facets as u64 && head.edges <= MESH_EDGES_MOST as u64;
         if !all && (head.facets, head.edges) != (0, 0) {
             return Err(Error::Block);
         }
@@ -144,7 +148,7 @@ impl<'m> Outlines<'m> {
         let blocks = view.take::<Block>(edges.div_ceil(WIDTH))?;
         let known = |group: &u32| ((group & !BOTH) as usize) < facets;
         // coordinates of the scene, senses of facets and numbers of bodies
-        let right = |(row, x): (usize, &f64)| x.abs() <= if row == ROWS - 1 { 4e9 } else { 4.0 };
+        let right = |(row, x): (usize, &f64)| x.abs() <= if row == EDGE_BLOCK_ROWS - 1 { 4e9 } else { 4.0 };
         let rows = blocks.iter().flat_map(|block| block.iter().enumerate());
         let mut values = rows.flat_map(|(row, lanes)| lanes.iter().map(move |x| (row, x)));
         if groups.iter().all(known) && values.all(right) {

@@ -149,14 +149,14 @@ fn product(a: f64, b: f64) -> (f64, f64) {
 
 /// Relative slack of a facet's box: far above the rounding of the sheared images (some 2^-51 of the corner's
 /// distance), far below what the boxes of the tree are widened by.
-pub(crate) const SLACK: f64 = 1.0 / (1u64 << 46) as f64;
+pub(crate) const FACET_BOX_SLACK: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// Up to this squared cosine a facet's plane is not trusted alone. Above it, t is within 2^-40 of the corner's
 /// distance of the entry into the facet's box, or after.
-const GRAZING: f64 = 1.0 / (1u64 << 20) as f64;
+const HIT_COSINE2_GRAZING: f64 = 1.0 / (1u64 << 20) as f64;
 
 /// Components of a direction below this are raised to it where they divide.
-const SMALLEST: f64 = 1e-200;
+const DIVISOR_LEAST: f64 = 1e-200;
 
 /// [`Line::edges`] with the right signs, and within an ulp or so.
 #[cold]
@@ -189,7 +189,7 @@ impl Line {
         // without branches, which no processor foresees
         let along = if (x > y) & (x > z) { 0 } else { 2 - usize::from(y > z) };
         let largest = [x, y, z].at(along);
-        if !(largest > SMALLEST && (x + y + z).is_finite() && ray.origin.is_finite()) {
+        if !(largest > DIVISOR_LEAST && (x + y + z).is_finite() && ray.origin.is_finite()) {
             return None;
         }
         let backward = usize::from(d.at(along) < 0.0); // keeps the sense of rotation
@@ -205,7 +205,9 @@ impl Line {
 
     /// 1 / direction, large instead of infinite.
     pub fn inverse(direction: Vec3) -> Vec3 {
-        Vec3::from_array(direction.to_array().map(|c| 1.0 / if fabs(c) > SMALLEST { c } else { SMALLEST }))
+        Vec3::from_array(
+            direction.to_array().map(|c| 1.0 / if fabs(c) > DIVISOR_LEAST { c } else { DIVISOR_LEAST }),
+        )
     }
 
     /// The image of a corner, given relative to the ray's origin.
@@ -235,7 +237,7 @@ impl Line {
         }
         let cosine = normal.dot(self.direction);
         let mut t = normal.dot(moved[0]) / cosine;
-        if cosine * cosine <= GRAZING * normal.dot(normal) {
+        if cosine * cosine <= HIT_COSINE2_GRAZING * normal.dot(normal) {
             t = self.clamp(t, &moved);
         }
         if !(t > 0.0 && t < f64::INFINITY) {
@@ -253,7 +255,7 @@ impl Line {
         let [a, b, c] = *moved;
         let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
         let inverse = Line::inverse(self.direction);
-        let slack = inverse.abs() * (reach * SLACK);
+        let slack = inverse.abs() * (reach * FACET_BOX_SLACK);
         let (p, q, r) = (a * inverse, b * inverse, c * inverse);
         let entry = (p.min(q).min(r) - slack).max_element();
         let exit = (p.max(q).max(r) + slack).min_element();

@@ -97,7 +97,8 @@ pub trait Mesh {
 }
 
 /// A material of nothing, for indices that are out of range.
-const NOTHING: MaterialInput<'_> = MaterialInput { diffuse: &[], specular: &[], emission: &[], gloss: None };
+const BLACK_MATERIAL: MaterialInput<'_> =
+    MaterialInput { diffuse: &[], specular: &[], emission: &[], gloss: None };
 
 impl Mesh for SceneInput<'_> {
     fn vertices(&self) -> usize {
@@ -145,7 +146,7 @@ impl Mesh for SceneInput<'_> {
     }
 
     fn material(&self, index: usize) -> MaterialInput<'_> {
-        self.materials.get(index).copied().unwrap_or(NOTHING)
+        self.materials.get(index).copied().unwrap_or(BLACK_MATERIAL)
     }
 
     fn two_sided(&self) -> bool {

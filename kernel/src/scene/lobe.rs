@@ -20,7 +20,7 @@ use crate::scene::MIRROR_AXIS_RATIO;
 use crate::scene::sun::Sun;
 
 /// The golden ratio's fraction: azimuth step, in turns, of a sunflower's seeds.
-const GOLDEN: f64 = 0.618_033_988_749_894_8;
+const SUNFLOWER_STEP: f64 = 0.618_033_988_749_894_8;
 
 /// Rays and samples keep at least this cosine to the facet's normal.
 const LEAST_COSINE: f64 = 1e-9;
@@ -184,7 +184,7 @@ impl Lobe {
             (0..=1, _) | (5..=9, 0) => (0.0, 0.0),
             (2..=4, _) => (0.5, (i + 0.5) / n),
             (5..=9, _) => (0.5 + 0.5 / n, (i - 0.5) / (n - 1.0)),
-            _ => ((i + 0.5) / n, i * GOLDEN - floor(i * GOLDEN)),
+            _ => ((i + 0.5) / n, i * SUNFLOWER_STEP - floor(i * SUNFLOWER_STEP)),
         };
         self.sample(mirror, normal, u, v + turn)
     }

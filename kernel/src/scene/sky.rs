@@ -20,7 +20,7 @@ use table::Table;
 const SUN_SHARE: f64 = 0.05;
 
 /// Radiance and irradiance above this are refused, so that f32 images stay finite.
-pub(crate) const LARGEST: f64 = 1e37;
+pub(crate) const RADIANCE_LARGEST: f64 = 1e37;
 
 /// How the sky's radiance depends on direction. `up` is the zenith of [`SkyInput`].
 #[derive(Clone, Copy, Debug)]
@@ -100,7 +100,7 @@ pub(crate) fn check_bands(values: &[f64], bands: usize, field: Field) -> Result<
     if values.len() != bands {
         return Err(Error::LightBandCount { field, expected: bands, given: values.len() });
     }
-    match values.iter().position(|value| !(0.0..=LARGEST).contains(value)) {
+    match values.iter().position(|value| !(0.0..=RADIANCE_LARGEST).contains(value)) {
         Some(band) => Err(Error::Range { field, band, value: values.get(band).copied().unwrap_or_default() }),
         None => Ok(()),
     }
@@ -137,7 +137,7 @@ impl<'a> Sky<'a> {
             SkyModel::Cie { kind, sun_direction } => {
                 let cie = Cie::new(kind, sun_direction, up)?;
                 for (band, &radiance) in input.radiance.iter().enumerate() {
-                    if radiance * cie.largest() > LARGEST {
+                    if radiance * cie.largest() > RADIANCE_LARGEST {
                         return Err(Error::Range { field: Field::SkyRadiance, band, value: radiance });
                     }
                 }

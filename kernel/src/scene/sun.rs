@@ -3,7 +3,7 @@
 use crate::base::error::{Error, Field};
 use crate::base::math::{PI, TAU, Vec3, acos, asin, clamp, cos, frame, sin, sqrt, unit};
 use crate::scene::MAX_BANDS;
-use crate::scene::sky::{LARGEST, SpotSun, check_bands};
+use crate::scene::sky::{RADIANCE_LARGEST, SpotSun, check_bands};
 
 /// What a sun is made from.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,7 @@ impl<'a> Sun<'a> {
         let irradiance = Irradiance::Told(input.irradiance);
         let sun = Sun { direction, irradiance, half_angle, sine, cosine };
         for (band, &value) in input.irradiance.iter().enumerate() {
-            if sun.disc_radiance(band) > LARGEST {
+            if sun.disc_radiance(band) > RADIANCE_LARGEST {
                 return Err(Error::Range { field: Field::SunIrradiance, band, value });
             }
         }

@@ -1,6 +1,6 @@
 //! From a scene to its coupling: how finely facets are cut, and the rows of all elements, in memory of the caller's.
 
-use super::{Count, Executor, block_rows};
+use super::{Count, Executor, LANES_MOST, block_rows};
 use crate::base::arena::{ALIGNMENT, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -157,11 +157,10 @@ impl CouplingRows<'_> {
 
 /// The most blocks that `rows` rows are spread over.
 pub fn places(rows: usize) -> usize {
-    2 * rows.div_ceil(block_rows(rows)) + 8 + MOST_LANES.min(rows.div_ceil(LANE_ROWS))
+    2 * rows.div_ceil(block_rows(rows)) + 8 + LANES_MOST.min(rows.div_ceil(LANE_ROWS))
 }
 
-/// The most lanes that rows in one piece of memory are split over, and the fewest rows of one.
-const MOST_LANES: usize = 256;
+/// The fewest rows of a lane where the rows in one piece of memory are split over several.
 const LANE_ROWS: usize = 16;
 
 /// Bytes in which rows may begin: those of one piece, while the last of them grows.
@@ -222,7 +221,7 @@ impl Packer<'_> {
     fn run<X: Executor>(&mut self, run: &mut X) -> Result<Result<(), Error>, X::Error> {
         let all = self.of.elements.unknowns();
         let piece = block_rows(all);
-        let lanes = run.lanes().min(MOST_LANES).min(all.div_ceil(LANE_ROWS)).max(1);
+        let lanes = run.lanes().min(LANES_MOST).min(all.div_ceil(LANE_ROWS)).max(1);
         let left = 1.0 - CUT_SHARE;
         let mut gap = 0..all;
         if lanes > 1 {

@@ -61,7 +61,7 @@ pub(super) fn solve<'m, X: Executor>(
     let glare = glare.map(|band| scene.largest_emission(band) / reference.at(band)).fold(0.0, f64::max);
     if glare > 1.0 {
         for ((_, row), variance) in coupling.rows(0..variance.len()).zip(variance.iter_mut()) {
-            let unseen = accuracy::UNSEEN * glare / f64::from(row.row.rays.max(1));
+            let unseen = accuracy::ROW_UNSEEN_RAYS * glare / f64::from(row.row.rays.max(1));
             *variance += if row.row.rays > 0 { narrow(unseen * unseen) } else { 0.0 };
         }
     }

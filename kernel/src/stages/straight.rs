@@ -16,11 +16,13 @@ use crate::settings;
 const LOOKERS: usize = 8;
 
 /// Rows of a piece.
-const ROWS: usize = 128;
+const STRAIGHT_PIECE_ROWS: usize = 128;
 
 /// Bytes of one lane.
 fn piece(bands: usize) -> Result<usize, Error> {
-    let rows = Need::new().and::<f64>(straight::stride(bands.min(MAX_BANDS)) * ROWS).and::<f32>(ROWS);
+    let rows = Need::new()
+        .and::<f64>(straight::stride(bands.min(MAX_BANDS)) * STRAIGHT_PIECE_ROWS)
+        .and::<f32>(STRAIGHT_PIECE_ROWS);
     Ok(Candidates::need(rows, 1).bytes()?.next_multiple_of(ALIGNMENT))
 }
 
@@ -46,23 +48,26 @@ pub(super) fn fill<X: Executor>(
     let lanes = run.lanes().clamp(1, LOOKERS);
     let mut first = 0;
     while first < all {
-        let range = |lane: usize| (first + lane * ROWS).min(all)..(first + (lane + 1) * ROWS).min(all);
+        let range = |lane: usize| {
+            (first + lane * STRAIGHT_PIECE_ROWS).min(all)..(first + (lane + 1) * STRAIGHT_PIECE_ROWS).min(all)
+        };
         run.pieces(scratch.lookers.head_mut(lanes * part), part, 0.0, |lane, memory| {
             let (range, size) = (range(lane), memory.len());
             let mut arena = Arena::new(memory, size)?;
-            let values = arena.take::<f64>(stride * ROWS)?.head_mut(stride * range.len());
-            let variance = arena.take::<f32>(ROWS)?.head_mut(range.len());
+            let values = arena.take::<f64>(stride * STRAIGHT_PIECE_ROWS)?.head_mut(stride * range.len());
+            let variance = arena.take::<f32>(STRAIGHT_PIECE_ROWS)?.head_mut(range.len());
             straight::rows(&looking, &mut Candidates::new(&mut arena, 1)?, range, values, variance)
         })?;
         for (lane, memory_of) in scratch.lookers.chunks(part.max(1)).take(lanes).enumerate() {
             let range = range(lane);
             let mut view = View::new(memory_of);
-            let (values, variance) = (view.take::<f64>(stride * ROWS)?, view.take::<f32>(ROWS)?);
+            let (values, variance) =
+                (view.take::<f64>(stride * STRAIGHT_PIECE_ROWS)?, view.take::<f32>(STRAIGHT_PIECE_ROWS)?);
             let to = stride * range.start..stride * range.end;
             copy(memory.straight.part_mut(to), values);
             copy(memory.straight_variance.part_mut(range), variance);
         }
-        first += lanes * ROWS;
+        first += lanes * STRAIGHT_PIECE_ROWS;
     }
     Ok(())
 }

@@ -51,7 +51,7 @@ pub struct CameraInput {
 }
 
 /// A facet is near where the square of its distance is below so many of that of its size.
-const NEAR: f64 = 4.0;
+const NEAR_DISTANCE2: f64 = 4.0;
 
 /// The most pixels along either side of an image.
 pub const MAX_RESOLUTION: usize = 1 << 16;
@@ -181,7 +181,7 @@ impl Camera {
             let seen = if scene.sides() == 2 { fabs(cosine) } else { cosine.max(0.0) };
             let distance = if self.parallel { 1.0 } else { sqrt(from.length_squared()) };
             let size = [a, b, c].iter().map(|corner| (*corner - middle).length_squared()).fold(0.0, f64::max);
-            if !self.parallel && seen > 0.0 && distance * distance < NEAR * size {
+            if !self.parallel && seen > 0.0 && distance * distance < NEAR_DISTANCE2 * size {
                 return f64::INFINITY;
             }
             scene.areas().at(facet) * seen / (distance * distance * distance).max(f64::MIN_POSITIVE)

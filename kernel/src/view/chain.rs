@@ -7,7 +7,7 @@ mod outlook;
 mod straight;
 mod sunlight;
 
-use crowd::{CROWDED, Surroundings};
+use crowd::{FINE_DETAIL_ERROR, Surroundings};
 pub(crate) use gather::{CAUTION, GATHERS};
 use gather::{Gathered, Onward, Spot};
 pub(crate) use outlook::{Outlook, Way};
@@ -19,6 +19,7 @@ use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::element::{Elements, Local};
+use crate::coupling::sink::CLOSED_REMAINDER_MOST;
 use crate::radiosity::solution::Solution;
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::{Hit, Ray};
@@ -66,7 +67,8 @@ impl ChainSettings {
         let ErrorBudget { solution, image, .. } = self.budget;
         let all = camera.columns() * camera.rows();
         let spread = scene.largest_diffuse() * gather::spread(reflected);
-        let each = gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::FEWEST.0);
+        let each =
+            gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::GATHER_RAYS_FEWEST.0);
         let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(AT_LEAST);
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
@@ -329,9 +331,6 @@ const FIRST_RAYS: f64 = 0.24;
 const FEWEST_LOBE_RAYS: u32 = 4;
 const MOST_LOBE_RAYS: f64 = 1024.0;
 
-/// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
-const MOST_CLOSED: f64 = 0.5;
-
 /// The rays of one lobe so far: sums over them.
 struct Fan<'w> {
     terms: &'w mut Terms,
@@ -474,7 +473,7 @@ impl Solved<'_> {
                 largest = f64::max(largest, *through);
             }
             if largest * self.numbers.brightest < self.settings.budget.chains
-                || leg.mirrors as usize >= crate::coupling::word::LONGEST
+                || leg.mirrors as usize >= crate::coupling::word::MIRRORS_MOST
             {
                 path.tail += largest * self.numbers.brightest;
                 self.close(leg, terms);
@@ -532,7 +531,7 @@ impl Solved<'_> {
             return;
         }
         for (band, &through) in leg.through.head(self.shape.bands).iter().enumerate() {
-            if through <= MOST_CLOSED {
+            if through <= CLOSED_REMAINDER_MOST {
                 let all = terms.mirror_diffuse.at(band) + terms.sum(band) * through / (1.0 - through);
                 terms.mirror_diffuse.set(band, all);
             }
@@ -717,7 +716,7 @@ impl Solved<'_> {
         if let Some(gathered) = leg.gathered.as_deref_mut()
             && self.is_crowded(surface, unknown, leg.far, &mut gathered.surroundings)
         {
-            variance = variance.max(CROWDED * CROWDED);
+            variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
         let by_element = self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance);
         let looks = self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element);

@@ -15,7 +15,7 @@ use crate::rays::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::{Camera, Sampling};
 use crate::view::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
-use crate::view::raster::{Items, NOTHING, UNSURE};
+use crate::view::raster::{Items, NO_FACET_DRAWN, UNSURE};
 use core::ops::Range;
 use lines::{Fineness, Measure, integrate};
 
@@ -74,9 +74,9 @@ pub struct Target<'o> {
 /// that some rows of centres meet.
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let width = camera.columns() + 2;
-    let need = Need::new().and::<f64>(3 * width * (3 * bands + NOTES)).and::<f64>(work(bands));
+    let need = Need::new().and::<f64>(3 * width * (3 * bands + PIXEL_NOTES)).and::<f64>(work(bands));
     let need = need.and::<Board>(1).and::<Way>(Outlook::ROOM);
-    Candidates::need(Items::need(need, width, DRAWN), KEPT).bytes()
+    Candidates::need(Items::need(need, width, DRAWN), CANDIDATE_FACETS_KEPT).bytes()
 }
 
 /// Rows of one piece of an image of so many, for who shares them out: few enough to balance, enough to be drawn together;
@@ -86,13 +86,13 @@ pub fn piece(rows: usize) -> usize {
 }
 
 /// Facets about which much stands whose outlines are remembered.
-const KEPT: usize = 8;
+const CANDIDATE_FACETS_KEPT: usize = 8;
 
 /// Rows that are drawn together.
 const DRAWN: usize = 8;
 
 /// Meshes of more facets than so many times the pixels are not drawn: rays cost less.
-const FACETS: usize = 2;
+const DRAWN_FACETS_PER_PIXEL: usize = 2;
 
 /// Values of two nested integrals and the result.
 fn work(bands: usize) -> usize {
@@ -100,21 +100,21 @@ fn work(bands: usize) -> usize {
 }
 
 /// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
-const NOTES: usize = 5;
+const PIXEL_NOTES: usize = 5;
 
 /// Fewest and most rays through a pixel that is sampled by scattered rays.
-const FEWEST: u32 = 8;
-const MOST: u32 = 1024;
+const SCATTER_RAYS_FEWEST: u32 = 8;
+const SCATTER_RAYS_MOST: u32 = 1024;
 
 /// Error of the mean of n scattered rays of the standard deviation s over s n^-3/4: 0.8 to 1.2 in penumbrae, lobes and
 /// at edges for 4 to 256 rays.
 const SCATTERED: f64 = 1.2;
 
 /// Error of integrals along lines over that of the jumps that they have left: what lies between lines is not among it.
-const LINES: f64 = 1.5;
+const LINE_ERROR_FACTOR: f64 = 1.5;
 
 /// Share of the contrast with neighbours that rays which have not seen it may miss.
-const UNSEEN: f64 = 0.35;
+const PIXEL_UNSEEN_SHARE: f64 = 0.35;
 
 /// Share of the contrast with a neighbour that counts as curvature: where radiance changes fast, detail between the pixels'
 /// centres is likelier.
@@ -122,12 +122,12 @@ const STEEP: f64 = 0.25;
 
 /// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line: what
 /// reaches less far into a pixel than a part, and ends there, is missed. The finer ones are for tolerances below [`FINE`].
-const PARTS: (usize, usize) = (4, 8);
+const PIXEL_PARTS: (usize, usize) = (4, 8);
 const FINE: f64 = 1e-3;
 
 /// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
 /// are up to so many times the error wanted.
-const COARSE: f64 = 60.0;
+const SCATTER_CONTRAST_MOST: f64 = 60.0;
 
 /// Narrowest parts between lines, and along them.
 const NARROWEST: (f64, f64) = (1.0 / 64.0, 1.0 / 4096.0);
@@ -172,7 +172,7 @@ pub fn rows(
     let solved = &Solved { settings, ..*solved };
     let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
     let width = camera.columns() + 2;
-    let stride = 3 * bands + NOTES;
+    let stride = 3 * bands + PIXEL_NOTES;
     let area = camera.sampling() == Sampling::Area;
     let lines = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
     let work = arena.take::<f64>(work(bands))?;
@@ -180,8 +180,9 @@ pub fn rows(
     board.work.gathered.start();
     let ways = arena.take::<Way>(Outlook::ROOM)?;
     let items = Items::new(&mut arena, width, DRAWN)?;
-    let candidates = Candidates::new(&mut arena, KEPT)?;
-    let draws = solved.bvh.is_own() && solved.scene.facets() / FACETS <= camera.columns() * camera.rows();
+    let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
+    let draws = solved.bvh.is_own()
+        && solved.scene.facets() / DRAWN_FACETS_PER_PIXEL <= camera.columns() * camera.rows();
     let mut painter = Painter {
         solved,
         camera,
@@ -219,7 +220,7 @@ pub fn rows(
 const SUN_RAYS: f64 = 8.0;
 
 /// How far from a pixel's edges its rays stay, in pixels.
-const EDGE: f64 = 1e-6;
+const PIXEL_MARGIN: f64 = 1e-6;
 
 plain_table! {
     /// A ray's terms and what following it takes, and the sums over scattered rays.
@@ -269,7 +270,7 @@ impl Primary<'_> {
 struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
     camera: &'a Camera,
-    /// Three rows of pixel centres, with a column more on either side: three terms, then [`NOTES`].
+    /// Three rows of pixel centres, with a column more on either side: three terms, then [`PIXEL_NOTES`].
     lines: &'s mut [f64],
     work: &'s mut [f64],
     width: usize,
@@ -325,7 +326,8 @@ impl<'a> Painter<'a, '_> {
             let mut beside = false;
             for j in 0..columns {
                 let at = self.slot(row, j);
-                let [object, variance, tail] = [0, 1, 2].map(|i| self.lines.at(at + self.stride - NOTES + i));
+                let [object, variance, tail] =
+                    [0, 1, 2].map(|i| self.lines.at(at + self.stride - PIXEL_NOTES + i));
                 self.note(object > 0.0, variance, tail);
                 if self.is_flat(at) && !beside {
                     self.write(target, index(j), at);
@@ -380,7 +382,7 @@ impl<'a> Painter<'a, '_> {
             let value = self.unevenness(row, j);
             let end = self.slot(row, j) + self.stride;
             self.lines.set(end - 1, value);
-            if self.lines.at(end - NOTES) > 0.0 {
+            if self.lines.at(end - PIXEL_NOTES) > 0.0 {
                 object += 1.0;
                 uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
             }
@@ -397,7 +399,7 @@ impl<'a> Painter<'a, '_> {
 
     /// Counts the error of an object pixel's area sampling.
     fn err(&mut self, at: usize, error: f64) {
-        if self.lines.at(at + self.stride - NOTES) > 0.0 {
+        if self.lines.at(at + self.stride - PIXEL_NOTES) > 0.0 {
             self.tally.sampling2 += error * error;
         }
     }
@@ -464,7 +466,7 @@ impl<'a> Painter<'a, '_> {
         (row, column): (isize, isize),
         columns: &Range<isize>,
     ) -> Option<Hit> {
-        if facet == NOTHING {
+        if facet == NO_FACET_DRAWN {
             return None;
         }
         if facet != UNSURE
@@ -508,7 +510,10 @@ impl<'a> Painter<'a, '_> {
             copy(slot.part_mut(0..bands), &terms.diffuse);
             copy(slot.part_mut(bands..2 * bands), &terms.mirror_sky);
             copy(slot.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
-            copy(slot.part_mut(3 * bands..3 * bands + NOTES), &[object, variance, path.tail, sampled, 0.0]);
+            copy(
+                slot.part_mut(3 * bands..3 * bands + PIXEL_NOTES),
+                &[object, variance, path.tail, sampled, 0.0],
+            );
         }
     }
 
@@ -586,7 +591,7 @@ impl<'a> Painter<'a, '_> {
             down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
         }
         let contrast = along.max(down);
-        let steep = contrast > COARSE * goal;
+        let steep = contrast > SCATTER_CONTRAST_MOST * goal;
         // scattered rays are few, and may all miss what is thin
         let thin = !steep && self.is_thin(row, column);
         if !sampled
@@ -619,16 +624,16 @@ impl<'a> Painter<'a, '_> {
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
         let goal = 0.7 * goal;
-        let parts = if solved.settings.budget.image < FINE { PARTS.1 } else { PARTS.0 };
+        let parts = if solved.settings.budget.image < FINE { PIXEL_PARTS.1 } else { PIXEL_PARTS.0 };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;
-            let mut places = [0.0; PARTS.1 + 1];
+            let mut places = [0.0; PIXEL_PARTS.1 + 1];
             let places = evenly(&mut places, parts, shift);
             let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
             integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
                 // a ray on the very edge may see what lies beyond it
-                let [x, y] = [x, y].map(|x| clamp(x, EDGE, 1.0 - EDGE));
+                let [x, y] = [x, y].map(|x| clamp(x, PIXEL_MARGIN, 1.0 - PIXEL_MARGIN));
                 let (x, y) = if along { (x, y) } else { (y, x) };
                 let ray = camera.ray(column as f64 + x, row as f64 + y);
                 terms.clear(measure.bands);
@@ -644,12 +649,12 @@ impl<'a> Painter<'a, '_> {
                 (!path.sampled).then_some(0.0)
             })
         };
-        let mut places = [0.0; PARTS.1 + 1];
+        let mut places = [0.0; PIXEL_PARTS.1 + 1];
         let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
         let out = self.work.part(2 * lines::memory(stride)..self.work.len());
         put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
-        Some(LINES * sqrt(error2))
+        Some(LINE_ERROR_FACTOR * sqrt(error2))
     }
 
     /// The mean over a pixel's square of scattered rays, as many as their contrast asks for.
@@ -667,7 +672,7 @@ impl<'a> Painter<'a, '_> {
         let sequence = Sequence::new(seed);
         self.board.sums.clear(bands);
         self.board.squares.head_mut(bands).fill(0.0);
-        let (mut n, mut goal) = (0u32, FEWEST);
+        let (mut n, mut goal) = (0u32, SCATTER_RAYS_FEWEST);
         let (mut error, mut glare, mut ahead) = (0.0, 0.0f64, AnswerBuffer::default());
         while n < goal {
             let camera = &self.camera;
@@ -702,9 +707,10 @@ impl<'a> Painter<'a, '_> {
                     }
                 }
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
-                error = SCATTERED * spread.max(UNSEEN * contrast * sqrt(share)) * pow(share, 0.75);
+                error =
+                    SCATTERED * spread.max(PIXEL_UNSEEN_SHARE * contrast * sqrt(share)) * pow(share, 0.75);
                 error = error.max(glare * share);
-                if error > wanted && goal < MOST {
+                if error > wanted && goal < SCATTER_RAYS_MOST {
                     goal *= 2;
                 }
             }
@@ -720,7 +726,7 @@ impl<'a> Painter<'a, '_> {
 
 /// The ends of so many equal parts of the unit interval, those within it shifted.
 #[inline]
-fn evenly(places: &mut [f64; PARTS.1 + 1], parts: usize, shift: f64) -> &[f64] {
+fn evenly(places: &mut [f64; PIXEL_PARTS.1 + 1], parts: usize, shift: f64) -> &[f64] {
     let places = places.head_mut(parts + 1);
     places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / parts as f64 + shift);
     places.set(0, 0.0);

@@ -19,7 +19,7 @@ use crate::rays::ray::Ray;
 use core::ops::Range;
 
 /// Nothing is met.
-pub const NOTHING: u32 = u32::MAX;
+pub const NO_FACET_DRAWN: u32 = u32::MAX;
 
 /// The drawing cannot tell: trace a ray.
 pub const UNSURE: u32 = u32::MAX - 1;
@@ -127,7 +127,7 @@ impl<'m> Items<'m> {
         self.facets.len() / self.columns.max(1)
     }
 
-    /// The facet that a sample meets first, [`NOTHING`] or [`UNSURE`]; the sample is one of those drawn last.
+    /// The facet that a sample meets first, [`NO_FACET_DRAWN`] or [`UNSURE`]; the sample is one of those drawn last.
     #[inline]
     pub fn facet(&self, row: isize, column: isize) -> u32 {
         let at = (row - self.first.1) as usize * self.columns + (column - self.first.0) as usize;
@@ -135,7 +135,7 @@ impl<'m> Items<'m> {
         if doubt == f64::NEG_INFINITY {
             return facet;
         }
-        if facet == NOTHING || doubt >= near - 2.0 * self.margin.of(near) { UNSURE } else { facet }
+        if facet == NO_FACET_DRAWN || doubt >= near - 2.0 * self.margin.of(near) { UNSURE } else { facet }
     }
 
     /// What [`Items::facet`] finds first in a row from `column` on that is not certain to be nothing; `end` if it is
@@ -144,7 +144,7 @@ impl<'m> Items<'m> {
         let start = (row - self.first.1) as usize * self.columns;
         let places = start + (column - self.first.0) as usize..start + (end - self.first.0) as usize;
         let (facets, doubt) = (self.facets.part(places.clone()), self.doubt.part(places));
-        let something = |(&facet, &doubt): (&u32, &f64)| facet != NOTHING || doubt > f64::NEG_INFINITY;
+        let something = |(&facet, &doubt): (&u32, &f64)| facet != NO_FACET_DRAWN || doubt > f64::NEG_INFINITY;
         facets.iter().zip(doubt).position(something).map_or(end, |n| column + n as isize)
     }
 
@@ -152,7 +152,7 @@ impl<'m> Items<'m> {
     pub fn draw(&mut self, bvh: &Bvh<'_>, samples: &Samples, rows: Range<isize>, first: isize) {
         self.near.fill(f64::NEG_INFINITY);
         self.doubt.fill(f64::NEG_INFINITY);
-        self.facets.fill(NOTHING);
+        self.facets.fill(NO_FACET_DRAWN);
         self.first = (first, rows.start);
         let rows = rows.start..rows.end.min(rows.start + self.rows() as isize);
         let view = View::new(bvh, samples, (first, self.columns), rows);
@@ -225,18 +225,18 @@ impl<'m> Items<'m> {
     }
 }
 
-/// Depths at cosines down to [`GRAZING`], those drawn and those of hits, are off by less than 2^-40 of the farthest
+/// Depths at cosines down to [`RASTER_COSINE_GRAZING`], those drawn and those of hits, are off by less than 2^-40 of the farthest
 /// distance from the eye; depths closer than this part of it are not told apart.
-const DEPTH: f64 = 1.0 / (1u64 << 34) as f64;
+const RASTER_DEPTH_ROUNDING: f64 = 1.0 / (1u64 << 34) as f64;
 
 /// Facets seen at a smaller cosine are left to rays.
-const GRAZING: f64 = 1.0 / (1u32 << 9) as f64;
+const RASTER_COSINE_GRAZING: f64 = 1.0 / (1u32 << 9) as f64;
 
 /// Rounding of a corner's place on the grid, per unit of what it is computed from: a dozen operations.
 const PLACE: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// Rounding of an edge function, per square of the sum of its corners' coordinates: eight operations.
-const EDGE: f64 = 1.0 / (1u64 << 49) as f64;
+const EDGE_FUNCTION_ROUNDING: f64 = 1.0 / (1u64 << 49) as f64;
 
 /// What drawing some rows takes.
 struct View<'a> {
@@ -269,7 +269,7 @@ impl<'a> View<'a> {
         let tangent = if samples.parallel { fabs(x) + fabs(y) } else { (fabs(x) + fabs(y)) * far };
         let (across, down) = (fabs(samples.step.0), fabs(samples.step.1));
         let place = PLACE * (far + tangent) * (1.0 + fabs(samples.shear)) * (1.0 / across + 1.0 / down);
-        let depth = DEPTH * (far + tangent);
+        let depth = RASTER_DEPTH_ROUNDING * (far + tangent);
         let margin = if samples.parallel {
             Margin { constant: depth, square: 0.0 }
         } else {
@@ -367,7 +367,7 @@ impl Triangle {
         let (rows, columns) = if parallel || before { bounds(view, [a, b, c])? } else { everything(view) };
         let reach = |v: Vec3| fabs(v.x) + fabs(v.y) + view.size * fabs(v.z);
         let most = reach(a).max(reach(b)).max(reach(c));
-        let error = EDGE * most * most + 4.0 * view.place * most;
+        let error = EDGE_FUNCTION_ROUNDING * most * most + 4.0 * view.place * most;
         let edges = [b.cross(c), c.cross(a), a.cross(b)];
         let volume = a.dot(edges[0]);
         let inverse = edges.map(|e| if fabs(e.x) * view.size > error { 1.0 / e.x } else { f64::INFINITY });
@@ -386,7 +386,8 @@ impl Triangle {
         let farthest = corners.map(|corner| (corner - samples.eye).length_squared());
         let farthest = farthest[0].max(farthest[1]).max(farthest[2]);
         let (sine, length) = if parallel { (ahead, 1.0) } else { (height, farthest) };
-        let steep = sine * sine >= GRAZING * GRAZING * normal.length_squared() * length;
+        let steep =
+            sine * sine >= RASTER_COSINE_GRAZING * RASTER_COSINE_GRAZING * normal.length_squared() * length;
         let certain = !thin && steep && (before || !parallel);
         Some(Triangle {
             edges: edges.map(|e| e.to_array()),

@@ -30,7 +30,7 @@ pub struct View {
 }
 
 /// The golden ratio less 1: rows of cells are shifted by its multiples, which fill a cell evenly.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+const CELL_ROW_SHIFT: f64 = 0.618_033_988_749_894_9;
 
 impl View {
     /// The view along `forward` (toward the object), on `cells` x `cells` cells.
@@ -58,10 +58,10 @@ impl View {
             first: (low.x, low.y),
             step: (size.x * step, size.y * step),
             shear: if size.x > 0.0 { size.y * step / size.x } else { 0.0 },
-            turn: GOLDEN,
+            turn: CELL_ROW_SHIFT,
         };
         let wanted = glints::are_wanted(solved);
-        let glints = if wanted { solved.scene.facets().div_ceil(glints::FACETS) } else { 0 };
+        let glints = if wanted { solved.scene.facets().div_ceil(glints::GLINT_FACETS) } else { 0 };
         Ok(View { samples, cells, cell_area: size.x * size.y * step * step, glints })
     }
 
@@ -84,9 +84,9 @@ plain_table! {
         /// Radiant intensity in W/sr, one value per band.
         pub intensity: [f64; MAX_BANDS],
         /// The same by every fourth row of cells, and how many rows these are.
-        pub parts: [[f64; MAX_BANDS]; PARTS],
+        pub parts: [[f64; MAX_BANDS]; SIGNATURE_SETS],
         /// Rows of each part.
-        pub counts: [f64; PARTS],
+        pub counts: [f64; SIGNATURE_SETS],
         /// Sum of the squares of errors of glints that are in part hidden or in shadow, (W/sr)^2.
         pub doubt2: [f64; MAX_BANDS],
         /// Sum over the projected area of the errors expected of the diffuse solution, of lobes and of chains that were cut,
@@ -100,15 +100,15 @@ plain_table! {
 }
 
 /// Parts of a signature whose differences tell its error: every fourth row.
-const PARTS: usize = 4;
+const SIGNATURE_SETS: usize = 4;
 
 impl Sums {
     /// Nothing yet.
     pub const ZERO: Sums = Sums {
         area: 0.0,
         intensity: [0.0; MAX_BANDS],
-        parts: [[0.0; MAX_BANDS]; PARTS],
-        counts: [0.0; PARTS],
+        parts: [[0.0; MAX_BANDS]; SIGNATURE_SETS],
+        counts: [0.0; SIGNATURE_SETS],
         doubt2: [0.0; MAX_BANDS],
         alike: 0.0,
         chance: 0.0,
@@ -127,7 +127,8 @@ impl Sums {
 
     /// Notes that what there is so far is a row of cells.
     fn end_row(&mut self, row: usize) {
-        if let (Some(part), Some(count)) = (self.parts.get_mut(row % PARTS), self.counts.get_mut(row % PARTS))
+        if let (Some(part), Some(count)) =
+            (self.parts.get_mut(row % SIGNATURE_SETS), self.counts.get_mut(row % SIGNATURE_SETS))
         {
             part.iter_mut().zip(&self.intensity).for_each(|(part, value)| *part = *value);
             *count = 1.0;
@@ -155,7 +156,7 @@ impl Sums {
             0.0 => None,
             count => Some(self.parts.get(part).map_or(0.0, |values| values.at(band)) * rows / count),
         };
-        let parts = || (0..PARTS).filter_map(whole);
+        let parts = || (0..SIGNATURE_SETS).filter_map(whole);
         let n = parts().count().max(2) as f64;
         let mean = parts().sum::<f64>() / n;
         let squares = parts().map(|value| (value - mean) * (value - mean)).sum::<f64>();
@@ -164,10 +165,10 @@ impl Sums {
 }
 
 /// Rows that are looked at together; small machines have little memory.
-const TOGETHER: usize = if cfg!(feature = "std") { 8 } else { 1 };
+const SIGNATURE_ROWS_TOGETHER: usize = if cfg!(feature = "std") { 8 } else { 1 };
 
 /// Meshes of more facets than so many times the cells are sampled: rays cost less than all facets' ends.
-const FACETS: usize = 2;
+const DRAWN_FACETS_PER_CELL: usize = 2;
 
 /// Facets less far apart on a row, in cells, touch.
 const GAP: f64 = 1e-9;
@@ -175,7 +176,7 @@ const GAP: f64 = 1e-9;
 /// Bytes of scratch memory for [`rows`] and [`whole`].
 pub fn scratch_bytes() -> Result<usize, Error> {
     let need = Need::new().and::<Sums>(2).and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
-    Lines::need(need, TOGETHER).bytes()
+    Lines::need(need, SIGNATURE_ROWS_TOGETHER).bytes()
 }
 
 /// The sums over each row of cells in `range`. Any split into ranges gives the same bits.
@@ -225,14 +226,14 @@ fn each_row<'s>(
     let terms = arena.take::<Terms>(1)?.first_mut().ok_or(short)?;
     let work = arena.take::<Work>(1)?.first_mut().ok_or(short)?;
     let ways = arena.take::<Way>(Outlook::ROOM)?;
-    let mut lines = Lines::new(&mut arena, TOGETHER)?;
+    let mut lines = Lines::new(&mut arena, SIGNATURE_ROWS_TOGETHER)?;
     let own = solved.bvh.is_own();
     let outlook = if own { Outlook::new(ways, true, view.cell_area, 1.0) } else { Outlook::none() };
     let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
     let solved = &Solved { settings: solved.settings.of_sums(), ..*solved };
     let mut tracer = Tracer { solved, view, area, terms, work, outlook };
     let flat = view.cell_area == 0.0;
-    let samples = !own || flat || solved.scene.facets() / FACETS > view.cells * view.cells;
+    let samples = !own || flat || solved.scene.facets() / DRAWN_FACETS_PER_CELL > view.cells * view.cells;
     let (mut next, end) = (range.start, range.end);
     for row in range {
         sums.clear();
@@ -242,7 +243,7 @@ fn each_row<'s>(
             continue;
         }
         if row == next && !samples {
-            next = end.min(view.cells).min(row + TOGETHER);
+            next = end.min(view.cells).min(row + SIGNATURE_ROWS_TOGETHER);
             lines.find(solved.bvh, &view.samples, view.cells, row as isize..next as isize);
         }
         match lines.of(row as isize) {

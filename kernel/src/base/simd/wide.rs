@@ -50,7 +50,7 @@ pub trait WideTask {
 
 /// What a positive normal number's bits say besides its fraction.
 const FRACTION: u64 = (1 << 52) - 1;
-const ONE: u64 = 1023 << 52;
+const EXPONENT_OF_ONE: u64 = 1023 << 52;
 /// 2^52: its fraction's bits hold an integer.
 const INTEGER: u64 = 1075 << 52;
 /// What is then taken off to give the exponent.
@@ -117,7 +117,7 @@ impl Wide for Array {
     }
     #[inline(always)]
     fn fraction(self) -> Self {
-        Array(self.0.map(|x| f64::from_bits(x.to_bits() & FRACTION | ONE)))
+        Array(self.0.map(|x| f64::from_bits(x.to_bits() & FRACTION | EXPONENT_OF_ONE)))
     }
     #[inline(always)]
     fn exponent(self) -> Self {
@@ -144,7 +144,7 @@ impl Lanes64 for Arrays {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 pub(super) mod avx2 {
-    use super::{Add, BIAS, Div, FRACTION, INTEGER, Lanes64, Mul, ONE, Sub, WIDTH, Wide};
+    use super::{Add, BIAS, Div, EXPONENT_OF_ONE, FRACTION, INTEGER, Lanes64, Mul, Sub, WIDTH, Wide};
     use core::arch::x86_64::*;
 
     /// Proof that the processor has AVX2.
@@ -226,7 +226,7 @@ pub(super) mod avx2 {
             // SAFETY: the value proves AVX2.
             unsafe {
                 let fraction = _mm256_castsi256_pd(_mm256_set1_epi64x(FRACTION.cast_signed()));
-                let one = _mm256_castsi256_pd(_mm256_set1_epi64x(ONE.cast_signed()));
+                let one = _mm256_castsi256_pd(_mm256_set1_epi64x(EXPONENT_OF_ONE.cast_signed()));
                 let (low, high) = (_mm256_and_pd(self.0, fraction), _mm256_and_pd(self.1, fraction));
                 F8(_mm256_or_pd(low, one), _mm256_or_pd(high, one))
             }
@@ -270,7 +270,7 @@ pub(super) mod avx2 {
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 pub(super) mod avx512 {
-    use super::{Add, BIAS, Div, FRACTION, INTEGER, Lanes64, Mul, ONE, Sub, WIDTH, Wide};
+    use super::{Add, BIAS, Div, EXPONENT_OF_ONE, FRACTION, INTEGER, Lanes64, Mul, Sub, WIDTH, Wide};
     use core::arch::x86_64::*;
 
     /// Proof that the processor has AVX-512F.
@@ -340,7 +340,7 @@ pub(super) mod avx512 {
         fn fraction(self) -> F8 {
             // SAFETY: the value proves AVX-512F.
             unsafe {
-                let (fraction, one) = (FRACTION.cast_signed(), ONE.cast_signed());
+                let (fraction, one) = (FRACTION.cast_signed(), EXPONENT_OF_ONE.cast_signed());
                 let bits = _mm512_and_si512(_mm512_castpd_si512(self.0), _mm512_set1_epi64(fraction));
                 F8(_mm512_castsi512_pd(_mm512_or_si512(bits, _mm512_set1_epi64(one))))
             }
@@ -378,7 +378,7 @@ pub(super) mod avx512 {
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 #[allow(unsafe_code)]
 pub(super) mod neon {
-    use super::{Add, BIAS, Div, FRACTION, INTEGER, Lanes64, Mul, ONE, Sub, WIDTH, Wide};
+    use super::{Add, BIAS, Div, EXPONENT_OF_ONE, FRACTION, INTEGER, Lanes64, Mul, Sub, WIDTH, Wide};
     use core::arch::aarch64::*;
 
     /// Compiled for targets alone whose processors all have NEON.
@@ -446,7 +446,7 @@ pub(super) mod neon {
             // SAFETY: the target has NEON.
             F8(self.0.map(|x| unsafe {
                 let fraction = vandq_u64(vreinterpretq_u64_f64(x), vdupq_n_u64(FRACTION));
-                vreinterpretq_f64_u64(vorrq_u64(fraction, vdupq_n_u64(ONE)))
+                vreinterpretq_f64_u64(vorrq_u64(fraction, vdupq_n_u64(EXPONENT_OF_ONE)))
             }))
         }
         #[inline(always)]
@@ -460,13 +460,12 @@ pub(super) mod neon {
         }
         #[inline(always)]
         fn bits([a, b, c, d]: [uint64x2_t; 4]) -> u32 {
-            const BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
             // SAFETY: the target has NEON; the array has as many bytes as the register, and no alignment is asked.
             unsafe {
                 let low = vcombine_u32(vmovn_u64(a), vmovn_u64(b));
                 let high = vcombine_u32(vmovn_u64(c), vmovn_u64(d));
                 let masks = vcombine_u16(vmovn_u32(low), vmovn_u32(high));
-                vaddvq_u16(vandq_u16(masks, vld1q_u16(BITS.as_ptr()))).into()
+                vaddvq_u16(vandq_u16(masks, vld1q_u16(super::super::LANE_BITS.as_ptr()))).into()
             }
         }
     }

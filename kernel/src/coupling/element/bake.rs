@@ -1,6 +1,6 @@
 //! Elements in baked blocks.
 
-use super::{Elements, LEAF, walk};
+use super::{ELEMENT_NODE, Elements, walk};
 use crate::base::arena::View;
 use crate::base::arena::Writer;
 use crate::base::error::Error;
@@ -20,7 +20,7 @@ impl<'m> Elements<'m> {
         let counts = view.take::<u64>(2)?;
         let (nodes, elements) = (counts.at(0) as usize, counts.at(1) as usize);
         let facets = scene.facets();
-        if nodes < facets || elements > nodes || nodes > LEAF as usize {
+        if nodes < facets || elements > nodes || nodes > ELEMENT_NODE as usize {
             return Err(Error::Block);
         }
         let first = view.take::<u32>(facets + 1)?;
@@ -29,15 +29,16 @@ impl<'m> Elements<'m> {
         let path = view.take::<u32>(elements)?;
         // quarters come after what they are quarters of: a walk down ends
         let sound = |(node, &child): (usize, &u32)| {
-            child & LEAF != 0 || (child as usize > node && (child as usize) < nodes.len().saturating_sub(3))
+            child & ELEMENT_NODE != 0
+                || (child as usize > node && (child as usize) < nodes.len().saturating_sub(3))
         };
         if !nodes.iter().enumerate().all(sound) {
             return Err(Error::Block);
         }
-        let child = |node: usize| Some(nodes.at(node)).filter(|c| c & LEAF == 0).map(|c| c as usize);
+        let child = |node: usize| Some(nodes.at(node)).filter(|c| c & ELEMENT_NODE == 0).map(|c| c as usize);
         let mut at = 0;
         let good = walk(facets, child, |of, node, steps| {
-            let same = nodes.at(node) == LEAF | at as u32
+            let same = nodes.at(node) == ELEMENT_NODE | at as u32
                 && facet.get(at).is_some_and(|f| *f as usize == of)
                 && path.get(at).is_some_and(|p| *p == steps.0)
                 && first.get(of).is_some_and(|start| *start as usize <= at)

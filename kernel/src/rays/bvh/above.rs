@@ -1,14 +1,14 @@
 //! Whether anything of the mesh rises above a plane: if not, no ray that starts there and goes up meets anything.
 
-use super::path_stack::{EMPTY, push, top};
-use super::{Bvh, LEAF, PAIR};
+use super::path_stack::{EMPTY_STACK, push, top};
+use super::{Bvh, LEAF_CHILD, PAIR};
 use crate::base::math::Vec3;
 
 /// See [`Bvh::rises_above`]. Apart: its stack is no burden to what the caller does next.
 #[inline(never)]
 pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
     let n = normal.to_array();
-    let (mut stack, mut depth) = (EMPTY, 0);
+    let (mut stack, mut depth) = (EMPTY_STACK, 0);
     push(&mut stack, &mut depth, 0, 0xff);
     while let Some((node, left)) = top(&mut stack, &mut depth) {
         let i = left.trailing_zeros() as usize & 7;
@@ -25,7 +25,7 @@ pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
         if highest <= height {
             continue;
         }
-        if children[i] & LEAF == 0 {
+        if children[i] & LEAF_CHILD == 0 {
             push(&mut stack, &mut depth, children[i], 0xff);
         } else if leaf_rises(bvh, children[i], normal, height) {
             return true;
@@ -35,7 +35,7 @@ pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
 }
 
 fn leaf_rises(bvh: &Bvh<'_>, leaf: u32, normal: Vec3, height: f64) -> bool {
-    let first = (leaf & !(LEAF | PAIR)) as usize;
+    let first = (leaf & !(LEAF_CHILD | PAIR)) as usize;
     let packets = first..first + 1 + usize::from(leaf & PAIR != 0);
     bvh.facets.get(packets).unwrap_or(&[]).as_flattened().iter().any(|&facet| {
         let solid = bvh.solids.get(facet as usize);

@@ -1,6 +1,9 @@
 //! Trees in baked blocks.
 
-use super::{Boxes, Bvh, LEAF, MOST, NONE, PAIR, Packet, STACK, Slack, Solid, extent, packed, solid};
+use super::{
+    BVH_FACETS_MOST, Boxes, Bvh, LEAF_CHILD, NO_LANE_FACET, PAIR, Packet, STACK, Slack, Solid, extent,
+    packed, solid,
+};
 use crate::base::arena::Writer;
 use crate::base::arena::{View, plain_struct};
 use crate::base::error::Error;
@@ -34,7 +37,7 @@ impl<'m> Bvh<'m> {
 
     pub(crate) fn get(view: &mut View<'m>, scene: &Scene<'_>, isa: Isa) -> Result<Bvh<'m>, Error> {
         let head = view.take::<Head>(1)?.first().copied().ok_or(Error::Block)?;
-        if head.nodes > MOST as u64 || head.packets > MOST as u64 {
+        if head.nodes > BVH_FACETS_MOST as u64 || head.packets > BVH_FACETS_MOST as u64 {
             return Err(Error::Block);
         }
         let (nodes, packets) = (head.nodes as usize, head.packets as usize);
@@ -76,8 +79,8 @@ impl<'m> Bvh<'m> {
                 if !low.iter().zip(&high).all(|(l, h)| l.is_finite() && h.is_finite() && l <= h) {
                     return None;
                 }
-                if link & LEAF != 0 {
-                    let first = (link & !(LEAF | PAIR)) as usize;
+                if link & LEAF_CHILD != 0 {
+                    let first = (link & !(LEAF_CHILD | PAIR)) as usize;
                     if first + usize::from(link & PAIR != 0) >= self.packets.len() {
                         return None;
                     }
@@ -96,11 +99,11 @@ impl<'m> Bvh<'m> {
     fn packets_sound(&self, scene: &Scene<'_>) -> bool {
         let mut live = 0;
         for ((packet, slack), lanes) in self.packets.iter().zip(self.slacks).zip(self.facets) {
-            let known = |facet: &u32| *facet == NONE || scene.areas().at(*facet as usize) > 0.0;
+            let known = |facet: &u32| *facet == NO_LANE_FACET || scene.areas().at(*facet as usize) > 0.0;
             if !lanes.iter().all(known) {
                 return false;
             }
-            live += lanes.iter().filter(|facet| **facet != NONE).count();
+            live += lanes.iter().filter(|facet| **facet != NO_LANE_FACET).count();
             let wanted = packed(lanes, scene.corners());
             let differs = |(a, b): (&f32, &f32)| a.to_bits() != b.to_bits();
             let (rows, kept) = (wanted.0.as_flattened().as_flattened(), packet.as_flattened().as_flattened());

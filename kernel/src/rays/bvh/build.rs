@@ -2,7 +2,7 @@
 //!
 //! This work is based on I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007.
 
-use super::{Boxes, LANES, MOST_LEVELS};
+use super::{Boxes, MOST_LEVELS, PACKET_LANES};
 use crate::base::arena::{Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -143,7 +143,7 @@ impl<'s> Binary<'s> {
 }
 
 /// Bins per axis.
-const BINS: usize = 16;
+const SPLIT_BINS: usize = 16;
 
 /// Builds the tree, level by level: nodes not yet split are leaves, and the array of nodes is the queue.
 pub(super) fn binned(facets: &Facets, tree: &mut Binary) {
@@ -158,9 +158,10 @@ pub(super) fn binned(facets: &Facets, tree: &mut Binary) {
             (level, level_end) = (level + 1, tree.nodes);
         }
         let [first, count] = tree.links.at(node);
-        if count as usize > LANES {
+        if count as usize > PACKET_LANES {
             let range = first as usize..(first + count) as usize;
-            let halvings = (count as usize).div_ceil(LANES).next_power_of_two().trailing_zeros() as usize;
+            let halvings =
+                (count as usize).div_ceil(PACKET_LANES).next_power_of_two().trailing_zeros() as usize;
             // halved by count where the levels that halving takes (25 for 2^28 facets) are all that are left
             let by_area = level + halvings < MOST_LEVELS;
             let left = split(facets, tree.order.part_mut(range.clone()), by_area);
@@ -215,13 +216,13 @@ struct Binning {
 
 impl Binning {
     fn new(low: f32, high: f32) -> Binning {
-        Binning { low, scale: if high > low { BINS as f32 / (high - low) } else { 0.0 } }
+        Binning { low, scale: if high > low { SPLIT_BINS as f32 / (high - low) } else { 0.0 } }
     }
 
     /// The cast saturates, and takes NaN (0 times infinity) to 0.
     #[inline(always)]
     fn of(&self, centre: f32) -> usize {
-        (((centre - self.low) * self.scale) as usize).min(BINS - 1)
+        (((centre - self.low) * self.scale) as usize).min(SPLIT_BINS - 1)
     }
 }
 
@@ -231,14 +232,14 @@ fn best_plane(facets: &Facets, order: &[u32], low: &[f32; 3], high: &[f32; 3]) -
     let mut least = f32::INFINITY;
     for axis in (0..3).filter(|&axis| high.at(axis) > low.at(axis)) {
         let binning = Binning::new(low.at(axis), high.at(axis));
-        let mut bins = [(Aabb::EMPTY, 0u32); BINS];
+        let mut bins = [(Aabb::EMPTY, 0u32); SPLIT_BINS];
         for &facet in order {
             let own = facets.get(facet);
             let Some((bounds, count)) = bins.get_mut(binning.of(own.centre(axis))) else { continue };
             bounds.join(&own);
             *count += 1;
         }
-        let mut right = [0.0f32; BINS];
+        let mut right = [0.0f32; SPLIT_BINS];
         let mut sweep = (Aabb::EMPTY, 0u32);
         for (place, bin) in right.iter_mut().zip(&bins).rev() {
             *place = cost(&mut sweep, bin);
@@ -259,7 +260,7 @@ fn best_plane(facets: &Facets, order: &[u32], low: &[f32; 3], high: &[f32; 3]) -
 fn cost(sweep: &mut (Aabb, u32), bin: &(Aabb, u32)) -> f32 {
     sweep.0.join(&bin.0);
     sweep.1 += bin.1;
-    sweep.0.half_area() * sweep.1.div_ceil(LANES as u32) as f32
+    sweep.0.half_area() * sweep.1.div_ceil(PACKET_LANES as u32) as f32
 }
 
 /// Puts those that are `left` first; how many they are.

@@ -1,7 +1,7 @@
 //! From the binary tree to nodes of eight.
 
 use super::build::{Aabb, Binary};
-use super::{Boxes, LANES, LEAF, NONE, PAIR};
+use super::{Boxes, LEAF_CHILD, NO_LANE_FACET, PACKET_LANES, PAIR};
 use crate::base::index::{Index, IndexMut};
 
 /// What came out.
@@ -19,7 +19,7 @@ pub(super) fn collapse(
     tree: &Binary,
     boxes: &mut [Boxes],
     children: &mut [[u32; 8]],
-    facets: &mut [[u32; LANES]],
+    facets: &mut [[u32; PACKET_LANES]],
 ) -> Made {
     let empty = tree.nodes == 0;
     let mut lanes = Lanes::new(facets, tree.order.len());
@@ -51,7 +51,7 @@ pub(super) fn collapse(
         }
         node += 1;
     }
-    Made { nodes, packets: lanes.used.div_ceil(LANES), levels }
+    Made { nodes, packets: lanes.used.div_ceil(PACKET_LANES), levels }
 }
 
 /// The up to eight descendants of a binary node that become children of one node.
@@ -77,31 +77,31 @@ fn open(tree: &Binary, root: u32) -> ([u32; 8], usize) {
 
 /// Hands out lanes of packets to leaves.
 struct Lanes<'a> {
-    facets: &'a mut [[u32; LANES]],
+    facets: &'a mut [[u32; PACKET_LANES]],
     used: usize,
     /// Lanes that may still be left empty.
     spare: usize,
 }
 
 impl<'a> Lanes<'a> {
-    fn new(facets: &'a mut [[u32; LANES]], live: usize) -> Self {
-        facets.iter_mut().for_each(|lanes| *lanes = [NONE; LANES]);
+    fn new(facets: &'a mut [[u32; PACKET_LANES]], live: usize) -> Self {
+        facets.iter_mut().for_each(|lanes| *lanes = [NO_LANE_FACET; PACKET_LANES]);
         Lanes { facets, used: 0, spare: live }
     }
 
-    /// The child that stands for the leaf of these facets, at most [`LANES`](super::LANES). The other facets of its packets, where
+    /// The child that stands for the leaf of these facets, at most [`PACKET_LANES`](super::PACKET_LANES). The other facets of its packets, where
     /// there are any, are tested along with it, which changes no hit.
     fn place<'f>(&mut self, leaf: impl ExactSizeIterator<Item = &'f u32>) -> u32 {
-        let (start, count) = (self.used % LANES, leaf.len());
-        let skipped = LANES - start;
-        if start + count > LANES && skipped <= self.spare {
+        let (start, count) = (self.used % PACKET_LANES, leaf.len());
+        let skipped = PACKET_LANES - start;
+        if start + count > PACKET_LANES && skipped <= self.spare {
             self.spare -= skipped;
             self.used += skipped;
         }
-        let (first, last) = (self.used / LANES, (self.used + count - 1) / LANES);
+        let (first, last) = (self.used / PACKET_LANES, (self.used + count - 1) / PACKET_LANES);
         let free = self.facets.as_flattened_mut().iter_mut().skip(self.used);
         free.zip(leaf).for_each(|(lane, &facet)| *lane = facet);
         self.used += count;
-        LEAF | first as u32 | if last > first { PAIR } else { 0 }
+        LEAF_CHILD | first as u32 | if last > first { PAIR } else { 0 }
     }
 }

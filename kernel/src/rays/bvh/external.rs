@@ -8,13 +8,13 @@ use core::fmt;
 
 /// Most rays that an [`Intersector`] is asked for at once: they wait on the stack, which is small where there is no
 /// standard library.
-pub const BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
+pub const INTERSECTOR_RAYS_MOST: usize = if cfg!(feature = "std") { 32 } else { 8 };
 
 /// No facet among the answers.
 pub const NO_FACET: u32 = u32::MAX;
 
 /// Which facets rays meet, in place of the tree's walk: for programs that own a ray tracer over the same mesh. It is asked
-/// for up to [`BATCH`] rays at once where rays do not depend on what others meet.
+/// for up to [`INTERSECTOR_RAYS_MOST`] rays at once where rays do not depend on what others meet.
 ///
 /// Only the facet is taken from it; distance and place are those of [`ray::intersect`].
 pub trait Intersector: Sync {
@@ -48,7 +48,7 @@ impl External<'_> {
         self.first(tree, ray, facet[0])
     }
 
-    /// Whether rays, at most [`BATCH`], meet anything: 1 or 0, to `hits`. Where the tracer names facets, those that the ray
+    /// Whether rays, at most [`INTERSECTOR_RAYS_MOST`], meet anything: 1 or 0, to `hits`. Where the tracer names facets, those that the ray
     /// does not meet are left to `tree`.
     #[inline(never)]
     fn any_batch(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [u32]) {
@@ -74,8 +74,8 @@ impl External<'_> {
     /// What the tracer says of many rays, or `tree`.
     #[inline(never)]
     pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        let mut facets = [NO_FACET; BATCH];
-        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+        let mut facets = [NO_FACET; INTERSECTOR_RAYS_MOST];
+        for (rays, hits) in rays.chunks(INTERSECTOR_RAYS_MOST).zip(hits.chunks_mut(INTERSECTOR_RAYS_MOST)) {
             let facets = facets.head_mut(rays.len());
             facets.fill(NO_FACET);
             self.tracer.first(rays, facets);
@@ -88,8 +88,10 @@ impl External<'_> {
     /// What the tracer says of many rays.
     #[inline(never)]
     pub fn any_many(&self, tree: &Bvh<'_>, rays: &[Ray], occluded: &mut [bool]) {
-        let mut answers = [0; BATCH];
-        for (rays, places) in rays.chunks(BATCH).zip(occluded.chunks_mut(BATCH)) {
+        let mut answers = [0; INTERSECTOR_RAYS_MOST];
+        for (rays, places) in
+            rays.chunks(INTERSECTOR_RAYS_MOST).zip(occluded.chunks_mut(INTERSECTOR_RAYS_MOST))
+        {
             let answers = answers.head_mut(rays.len());
             answers.fill(0);
             self.any_batch(tree, rays, answers);
@@ -121,7 +123,7 @@ impl External<'_> {
 /// Buffer of a tracer's answers to consecutive rays of a numbered series, asked for together.
 #[derive(Debug, Default)]
 pub struct AnswerBuffer {
-    answers: [u32; BATCH],
+    answers: [u32; INTERSECTOR_RAYS_MOST],
     first: u32,
     count: u32,
 }
@@ -146,8 +148,8 @@ impl AnswerBuffer {
         if at < self.count {
             return self.answers.at(at as usize);
         }
-        let mut rays = [Ray::new(Vec3::ZERO, Vec3::ZERO); BATCH];
-        let count = (end.saturating_sub(number) as usize).clamp(1, BATCH);
+        let mut rays = [Ray::new(Vec3::ZERO, Vec3::ZERO); INTERSECTOR_RAYS_MOST];
+        let count = (end.saturating_sub(number) as usize).clamp(1, INTERSECTOR_RAYS_MOST);
         let rays = rays.head_mut(count);
         for (ahead, place) in (number..).zip(&mut *rays) {
             *place = ray(ahead);

@@ -1,7 +1,7 @@
 //! The tree built by the crate obvhs, brought into the kernel's binary form.
 
 use super::build::{Aabb, Binary, Facets, binned};
-use super::{LANES, MOST_LEVELS};
+use super::{MOST_LEVELS, PACKET_LANES};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
@@ -56,7 +56,7 @@ fn counts(built: &Bvh2) -> Vec<u32> {
     counts
 }
 
-/// Copies `built`, its subtrees of up to [`LANES`] facets made leaves. False where it is too deep.
+/// Copies `built`, its subtrees of up to [`PACKET_LANES`] facets made leaves. False where it is too deep.
 fn convert(built: &Bvh2, tree: &mut Binary) -> bool {
     let counts = counts(built);
     let facets: Vec<u32> = tree.order.to_vec();
@@ -65,7 +65,7 @@ fn convert(built: &Bvh2, tree: &mut Binary) -> bool {
     tree.push(&unboxed(&built.nodes[0].aabb), 0, 0);
     let mut stack = vec![(0usize, 0usize, 0usize)];
     while let Some((node, place, level)) = stack.pop() {
-        if counts[node] as usize <= LANES {
+        if counts[node] as usize <= PACKET_LANES {
             tree.links[place] = [ordered.len() as u32, counts[node]];
             leaves(built, node, |own| ordered.push(facets[own as usize]));
             continue;

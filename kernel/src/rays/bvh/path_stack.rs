@@ -8,7 +8,7 @@ use crate::base::index::IndexMut;
 pub(super) type PathStack = [(u32, u32); MOST_LEVELS];
 
 /// The empty stack.
-pub(super) const EMPTY: PathStack = [(0, 0); MOST_LEVELS];
+pub(super) const EMPTY_STACK: PathStack = [(0, 0); MOST_LEVELS];
 
 /// Pushes a node with the children that are left to visit.
 #[inline(always)]

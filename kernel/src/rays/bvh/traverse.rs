@@ -18,7 +18,7 @@
 use super::STACK;
 #[cfg(target_pointer_width = "32")]
 use super::path_stack::{self, PathStack};
-use super::{Boxes, Bvh, LANES, LEAF, NONE, PAIR, Packet, Slack};
+use super::{Boxes, Bvh, LEAF_CHILD, NO_LANE_FACET, PACKET_LANES, PAIR, Packet, Slack};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
 use crate::base::simd::{self, LaneTask, Lanes};
@@ -30,22 +30,22 @@ const WIDEN: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
 
 /// Direction components below this are raised to it in the slab test: across the whole scene it moves the ray
 /// by far less than `pad`, and keeps the quotients finite in f32.
-const SMALLEST: f32 = 1e-18;
+const SLAB_DIRECTION_LEAST: f32 = 1e-18;
 
 /// Origins from here on leave f32.
 const FARTHEST: f64 = 1e38;
 
 /// Times a facet's extent: error of its edge functions by that of the images.
-pub(super) const SLACK: f64 = 16.0;
+pub(super) const LANE_EDGE_SLACK: f64 = 16.0;
 
 /// Entries of the short stack, enough for nine levels of nodes.
-pub(super) const SHORT: usize = 64;
+pub(super) const STACK_SHORT: usize = 64;
 
 /// Whether a tree's walk has a short stack: on 32 bits, where code and stack are scarce and f64 is slow, all trees have one
 /// kind.
 #[inline(always)]
 pub(super) fn is_short(bvh: &Bvh) -> bool {
-    cfg!(target_pointer_width = "64") && bvh.levels * 7 < SHORT
+    cfg!(target_pointer_width = "64") && bvh.levels * 7 < STACK_SHORT
 }
 
 /// See [`Bvh::closest`].
@@ -66,7 +66,7 @@ fn search(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
 /// Search with the short stack. Not inlined: the frame of deep trees' search stays free of it.
 #[inline(never)]
 fn search_short(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
-    simd::run_lanes(bvh.isa, Search::<[u64; SHORT]> { bvh, ray, any, stack: PhantomData })
+    simd::run_lanes(bvh.isa, Search::<[u64; STACK_SHORT]> { bvh, ray, any, stack: PhantomData })
 }
 
 /// Search with the long stack. Not inlined: its frame is paid for by deep trees alone.
@@ -159,7 +159,7 @@ impl<const N: usize> Stack for [u64; N] {
 /// takes a seventh of the memory of children with distances.
 #[cfg(target_pointer_width = "32")]
 impl Stack for PathStack {
-    const EMPTY: Self = path_stack::EMPTY;
+    const EMPTY: Self = path_stack::EMPTY_STACK;
 
     #[inline(always)]
     fn push_children(
@@ -234,7 +234,7 @@ impl TraversalRay {
         origin: [0.0; 3],
         shear: [0.0; 2],
         error: 0.0,
-        skip: NONE,
+        skip: NO_LANE_FACET,
         start: 0.0,
         pad: 0.0,
         first: First { scale: 0.0, t_max: 0.0, nearest: 0.0 },
@@ -261,7 +261,8 @@ impl TraversalRay {
             origin = wide(moved);
         }
         let direction = wide(ray.direction);
-        let inverse = direction.map(|c| 1.0 / if c.abs() > SMALLEST { c } else { SMALLEST });
+        let inverse =
+            direction.map(|c| 1.0 / if c.abs() > SLAB_DIRECTION_LEAST { c } else { SLAB_DIRECTION_LEAST });
         let [x, y, z, _] = direction.map(f32::abs);
         let along = if (x > y) & (x > z) { 0 } else { 2 - usize::from(y > z) };
         let [first, second] = NEXT.at(along);
@@ -300,7 +301,7 @@ impl TraversalRay {
         let mut best = None;
         let mut next = if bvh.boxes.is_empty() { return None } else { 0 };
         loop {
-            if next & LEAF == 0 {
+            if next & LEAF_CHILD == 0 {
                 let boxes = bvh.boxes.get(next as usize)?;
                 let children = bvh.children.get(next as usize)?;
                 let (near, far) = beam.slabs(boxes, self.limit);
@@ -335,7 +336,7 @@ impl TraversalRay {
     /// Tests the packets of a leaf.
     #[inline(always)]
     fn leaf<L: Lanes>(&mut self, beam: &LaneRay<L>, bvh: &Bvh, ray: &Ray, leaf: u32, best: &mut Option<Hit>) {
-        let first = (leaf & !(LEAF | PAIR)) as usize;
+        let first = (leaf & !(LEAF_CHILD | PAIR)) as usize;
         for index in first..=first + usize::from(leaf & PAIR != 0) {
             let Some(lanes) = bvh.lanes(index) else { return };
             self.confirm(bvh, ray, lanes.2, beam.inside(lanes), best);
@@ -348,7 +349,7 @@ impl TraversalRay {
         &mut self,
         bvh: &Bvh,
         ray: &Ray,
-        facets: &[u32; LANES],
+        facets: &[u32; PACKET_LANES],
         mut set: u32,
         best: &mut Option<Hit>,
     ) {
@@ -428,7 +429,7 @@ impl<L: Lanes> LaneRay<L> {
     /// Which of eight facets may have the ray inside, as bits; not the one to skip.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline(always))]
-    pub fn inside(&self, (packet, slack, facets): (&Packet, &Slack, &[u32; LANES])) -> u32 {
+    pub fn inside(&self, (packet, slack, facets): (&Packet, &Slack, &[u32; PACKET_LANES])) -> u32 {
         let lanes = self.lanes;
         let [a, b, c] = [self.image(&packet[0]), self.image(&packet[1]), self.image(&packet[2])];
         let edges = [self.cross(c, b), self.cross(a, c), self.cross(b, a)];

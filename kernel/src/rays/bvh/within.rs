@@ -1,8 +1,8 @@
 //! Which facets reach into a convex region: those of a row of pixels, or those that may stand in the way of parallel
 //! rays that leave a facet.
 
-use super::path_stack::{EMPTY, push, top};
-use super::{Boxes, Bvh, LANES, LEAF, PAIR, Packet};
+use super::path_stack::{EMPTY_STACK, push, top};
+use super::{Boxes, Bvh, LEAF_CHILD, PACKET_LANES, PAIR, Packet};
 use crate::base::math::{Vec3, fabs};
 use crate::base::simd::{self, LaneTask, Lanes};
 use crate::rays::ray::{First, Hit, Line, Ray};
@@ -73,10 +73,10 @@ impl<F: FnMut(u32) -> bool, const N: usize> LaneTask for Within<'_, F, N> {
         for (plane, half) in planes.iter_mut().zip(self.halves) {
             *plane = Plane::new(lanes, half, bvh.scale);
         }
-        let (mut stack, mut depth) = (EMPTY, 0);
+        let (mut stack, mut depth) = (EMPTY_STACK, 0);
         let mut next = 0;
         loop {
-            if next & LEAF == 0 {
+            if next & LEAF_CHILD == 0 {
                 let Some(boxes) = bvh.boxes.get(next as usize) else { return };
                 // loops rather than closures, which are not inlined into code compiled for another instruction set
                 let mut reached = 0xff;
@@ -100,7 +100,7 @@ impl<F: FnMut(u32) -> bool, const N: usize> Within<'_, F, N> {
     /// False where that was enough.
     #[inline(always)]
     fn leaf<L: Lanes>(&mut self, planes: &[Plane<L>; N], leaf: u32) -> bool {
-        let first = (leaf & !(LEAF | PAIR)) as usize;
+        let first = (leaf & !(LEAF_CHILD | PAIR)) as usize;
         for index in first..=first + usize::from(leaf & PAIR != 0) {
             let Some((packet, _, facets)) = self.bvh.lanes(index) else { return false };
             let mut left = 0xff;
@@ -108,7 +108,7 @@ impl<F: FnMut(u32) -> bool, const N: usize> Within<'_, F, N> {
                 left &= plane.reached_by_facets(packet);
             }
             while left != 0 {
-                let facet = facets[left.trailing_zeros() as usize % LANES];
+                let facet = facets[left.trailing_zeros() as usize % PACKET_LANES];
                 left &= left - 1;
                 if self.reaches(facet) && !(self.visit)(facet) {
                     return false;
@@ -123,14 +123,14 @@ impl<F: FnMut(u32) -> bool, const N: usize> Within<'_, F, N> {
         let Some([a, b, c, _]) = self.bvh.solids.get(facet as usize) else { return false };
         let corners = [a, b, c].map(|&corner| Vec3::from_array(corner));
         self.halves.iter().all(|half| {
-            let slack = SLACK * (self.bvh.scale + fabs(half.height));
+            let slack = HALF_SPACE_ROUNDING * (self.bvh.scale + fabs(half.height));
             corners.iter().any(|corner| corner.dot(half.normal) >= half.height - slack)
         })
     }
 }
 
 /// Error of p.normal - height in f64, in units of the coordinates: a dot product's and the height's roundings.
-const SLACK: f64 = 4.0 / (1u64 << 53) as f64;
+const HALF_SPACE_ROUNDING: f64 = 4.0 / (1u64 << 53) as f64;
 
 /// The same in f32: roundings of the normal, of three products and their sums, and of the coordinates of facets.
 const SLACK32: f64 = 1.0 / (1u64 << 20) as f64;

@@ -1,7 +1,10 @@
 //! What matters to the points of one facet: the edges that are outlines from some of them, and the facets over their pole.
 
 use super::contour::{self, Contour, spread, sweep};
-use super::{BOTH, Balls, Basis, Block, OpenSky, Outlines, SLACK, circles, plane, precedes, product};
+use super::{
+    BOTH, Balls, Basis, Block, KEEPS_OUTLINES, OUTLINE_HEIGHT_SLACK, OpenSky, Outlines, circles, plane,
+    precedes, product,
+};
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -11,26 +14,23 @@ use crate::rays::bvh::Bvh;
 use crate::scene::Scene;
 
 /// The most edges that are looked at for one facet: where more may be outlines, rays cost less.
-const MOST_EDGES: usize = 1024;
+const OUTLINE_EDGES_MOST: usize = 1024;
 
 /// Blocks of one facet at most, and facets over its pole.
-const BLOCKS: usize = if KEEPS { MOST_EDGES / WIDTH } else { 0 };
-const POLES: usize = if KEEPS { 512 } else { 0 };
+const CANDIDATE_BLOCKS: usize = if KEEPS_OUTLINES { OUTLINE_EDGES_MOST / WIDTH } else { 0 };
+const POLES: usize = if KEEPS_OUTLINES { 512 } else { 0 };
 
 /// Lists that are kept for each facet that would need all of that.
-const LISTS: usize = if KEEPS { 32 } else { 0 };
+const LISTS: usize = if KEEPS_OUTLINES { 32 } else { 0 };
 
 /// Room for crossings.
-const CROSSINGS: usize = if KEEPS { 2 * MOST_EDGES + 16 * WIDTH } else { 0 };
-
-/// Where memory is small nothing is kept, and rays find what is open.
-const KEEPS: bool = cfg!(feature = "std");
+const CROSSINGS: usize = if KEEPS_OUTLINES { 2 * OUTLINE_EDGES_MOST + 16 * WIDTH } else { 0 };
 
 /// In place of a count: too many.
-const CROWDED: u32 = u32::MAX;
+const EDGES_TOO_MANY: u32 = u32::MAX;
 
 /// Heights of planes above a corner (scene coordinates) whose sign is in doubt.
-const DOUBT: f64 = 1e-13;
+const PLANE_HEIGHT_ROUNDING: f64 = 1e-13;
 
 /// Rows of an active edge: both ends in the frame of the point, and its jumps of all and of counted facets.
 pub(super) const ACTIVE: usize = 8;
@@ -83,7 +83,7 @@ plain_struct! {
     pub struct List {
         /// Twice the facet and the side, and one; 0: nothing.
         pub side: u32,
-        /// Where its edges start, in blocks, and how many there are; or [`CROWDED`].
+        /// Where its edges start, in blocks, and how many there are; or [`EDGES_TOO_MANY`].
         pub blocks: u32,
         /// See there.
         pub edges: u32,
@@ -113,18 +113,19 @@ impl<'m> Candidates<'m> {
     /// Adds the memory that it works in, with room for `kept` facets about which much stands, or some dozen times as many
     /// about which little does.
     pub fn need(need: Need, kept: usize) -> Need {
-        let need = need.and::<Block>(kept * BLOCKS).and::<u32>(kept * POLES).and::<List>(kept * LISTS);
-        need.and::<Active>(BLOCKS).and::<Crossing>(CROSSINGS).and::<Crossing>(CROSSINGS)
+        let need =
+            need.and::<Block>(kept * CANDIDATE_BLOCKS).and::<u32>(kept * POLES).and::<List>(kept * LISTS);
+        need.and::<Active>(CANDIDATE_BLOCKS).and::<Crossing>(CROSSINGS).and::<Crossing>(CROSSINGS)
     }
 
     /// Takes that memory.
     pub fn new(arena: &mut Arena<'m>, kept: usize) -> Result<Candidates<'m>, Error> {
         Ok(Candidates {
-            pool: arena.take(kept * BLOCKS)?,
+            pool: arena.take(kept * CANDIDATE_BLOCKS)?,
             poles: arena.take(kept * POLES)?,
             lists: arena.take(kept * LISTS)?,
             used: (0, 0),
-            active: arena.take(BLOCKS)?,
+            active: arena.take(CANDIDATE_BLOCKS)?,
             crossings: arena.take(CROSSINGS)?,
             sorted: arena.take(CROSSINGS)?,
             list: List::default(),
@@ -159,9 +160,10 @@ impl<'m> Candidates<'m> {
         let place = name as usize % self.lists.len().max(1);
         self.list = self.lists.at(place);
         if self.list.side != name {
-            let full = self.used.0 + BLOCKS > self.pool.len() || self.used.1 + POLES > self.poles.len();
+            let full =
+                self.used.0 + CANDIDATE_BLOCKS > self.pool.len() || self.used.1 + POLES > self.poles.len();
             self.list = self.find(scene, outlines, isa, facet, name);
-            if self.list.edges == CROWDED && full {
+            if self.list.edges == EDGES_TOO_MANY && full {
                 // make room, and once more
                 self.lists.fill(List::default());
                 self.used = (0, 0);
@@ -169,7 +171,7 @@ impl<'m> Candidates<'m> {
             }
             self.lists.set(place, self.list);
         }
-        self.list.edges != CROWDED
+        self.list.edges != EDGES_TOO_MANY
     }
 
     /// Finds them behind what is in use.
@@ -186,11 +188,11 @@ impl<'m> Candidates<'m> {
         let normal = self.normal;
         let height = corners.iter().map(|c| product(normal, *c)).fold(f64::INFINITY, f64::min);
         let (blocks, poles) = self.used;
-        let end = (blocks + BLOCKS).min(self.pool.len());
+        let end = (blocks + CANDIDATE_BLOCKS).min(self.pool.len());
         let free = self.pool.part_mut(blocks..end);
         let (edges, fits) = run_wide(isa, Sort { outlines, corners, normal, height, out: free });
         let over = if fits { self.over_pole(scene, outlines, facet, corners, height) } else { None };
-        let Some(over) = over else { return List { side: name, edges: CROWDED, ..List::default() } };
+        let Some(over) = over else { return List { side: name, edges: EDGES_TOO_MANY, ..List::default() } };
         self.used = (blocks + edges.div_ceil(WIDTH), poles + over);
         List {
             side: name,
@@ -230,7 +232,7 @@ impl<'m> Candidates<'m> {
                 near &= near - 1;
                 let of = outlines.groups.at(facet) & !BOTH;
                 let heights = scene.corners().at(facet).map(|c| product(self.normal, c) - height);
-                if of != group && heights.iter().any(|h| *h > SLACK) {
+                if of != group && heights.iter().any(|h| *h > OUTLINE_HEIGHT_SLACK) {
                     *places.get_mut(count)? = facet as u32;
                     count += 1;
                 }
@@ -250,7 +252,7 @@ impl<'m> Candidates<'m> {
         goal: f64,
     ) -> Option<OpenSky> {
         let (known, isa) = (bvh.outlines(), bvh.isa());
-        if cfg!(not(feature = "std")) || self.list.side == 0 || self.list.edges == CROWDED {
+        if cfg!(not(feature = "std")) || self.list.side == 0 || self.list.edges == EDGES_TOO_MANY {
             return None;
         }
         let frame = Frame::new(point, self.normal, basis);
@@ -309,13 +311,13 @@ impl<'m> Candidates<'m> {
 }
 
 /// Open share that is rounding of the contour's sum: nothing is open.
-const CLOSED: f64 = 1e-6;
+const OPEN_SHARE_ROUNDING: f64 = 1e-6;
 
 /// Open shares and heights within what is possible: a share is at most the whole one, and heights are at most shares on
 /// either side of the horizon.
 fn bounded([all, high, near, near_high]: [f64; 4], whole: [f64; 4], above: bool) -> [f64; 4] {
     let all = all.min(whole[0]);
-    if all < CLOSED {
+    if all < OPEN_SHARE_ROUNDING {
         return [0.0; 4];
     }
     let near = near.min(whole[2]).max(0.0).min(all);
@@ -383,7 +385,8 @@ impl WideTask for Sort<'_> {
         let Sort { outlines, corners, normal, height, out } = self;
         let n = spread(lanes, normal);
         let corners = [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])];
-        let (least, doubt, zero) = (lanes.all(height + SLACK), lanes.all(DOUBT), lanes.all(0.0));
+        let (least, doubt, zero) =
+            (lanes.all(height + OUTLINE_HEIGHT_SLACK), lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0));
         let mut count = 0;
         for (number, block) in outlines.blocks.iter().enumerate() {
             let row = |k: usize| lanes.of(&block[k]);

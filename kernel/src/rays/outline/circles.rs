@@ -15,14 +15,14 @@ use crate::base::sort::sort;
 const HALVES: usize = 2 * WIDTH;
 
 /// Parts of the half circles, whose difference tells the error.
-const PARTS: usize = 4;
+const CIRCLE_SETS: usize = 4;
 
 /// Error of the mean over that of independent parts: they fill one another's gaps.
-const TOGETHER: f64 = 0.6;
+const CIRCLE_SETS_CORRELATION: f64 = 0.6;
 
 /// The least error of one set over what it finds, and the power of the number of sets by which that falls: of outlines that
 /// cross at random.
-const LEAST: f64 = 0.1;
+const CIRCLES_ERROR_LEAST: f64 = 0.1;
 const POWER: f64 = 1.7;
 
 /// Error of one set where half circles meet more than [`SIMPLE`] outlines, or outlines of several bodies, and none covers
@@ -66,7 +66,7 @@ pub(super) fn look(
     // by where the point is, so that circles of neighbours lie apart
     let [x, y, z] = frame.point.to_array().map(|x| (x * 65536.0) as i32 as u32);
     let start = f64::from(hash2(x, hash2(y, z))) / 4_294_967_296.0;
-    let (mut sums, mut parts) = ([[0.0; 4]; 2], [[0.0; PARTS]; 2]);
+    let (mut sums, mut parts) = ([[0.0; 4]; 2], [[0.0; CIRCLE_SETS]; 2]);
     let (mut set, mut sets, mut most) = (0u32, 1u32, 0);
     loop {
         while set < sets {
@@ -80,9 +80,9 @@ pub(super) fn look(
             for (half, terms) in own.iter().enumerate() {
                 sums.iter_mut().flatten().zip(terms.iter().flatten()).for_each(|(sum, term)| *sum += term);
                 let part = match sets {
-                    1 => half % PARTS,
+                    1 => half % CIRCLE_SETS,
                     2 => half % 2 + 2 * (set as usize),
-                    _ => set as usize * PARTS / sets as usize,
+                    _ => set as usize * CIRCLE_SETS / sets as usize,
                 };
                 for (sums, term) in parts.iter_mut().zip(terms) {
                     let sum = sums.at(part) + term[0];
@@ -96,7 +96,8 @@ pub(super) fn look(
         // lines that agree by chance do not end it
         let amounts = [means[0].abs(), means[1].min(1.0 - means[1])];
         let missed = if most > SIMPLE || !one { MISSED / f64::from(sets * sets) } else { 0.0 };
-        let least = |k: usize| (LEAST * amounts.at(k) * pow(f64::from(sets), -POWER)).max(missed);
+        let least =
+            |k: usize| (CIRCLES_ERROR_LEAST * amounts.at(k) * pow(f64::from(sets), -POWER)).max(missed);
         let error = |k: usize| spread(&parts[k], lines).max(least(k));
         let errors = [error(0), error(1)];
         let is_open = errors[1] < errors[0];
@@ -117,14 +118,15 @@ pub(super) fn look(
 }
 
 /// Expected error of the mean of so many lines, by the sums of parts of them that are spread alike.
-fn spread(parts: &[f64; PARTS], lines: f64) -> f64 {
-    let mean = parts.iter().sum::<f64>() / PARTS as f64;
-    let square = parts.iter().map(|p| (p - mean) * (p - mean)).sum::<f64>() / (PARTS * (PARTS - 1)) as f64;
-    TOGETHER * sqrt(square) * PARTS as f64 / lines
+fn spread(parts: &[f64; CIRCLE_SETS], lines: f64) -> f64 {
+    let mean = parts.iter().sum::<f64>() / CIRCLE_SETS as f64;
+    let square =
+        parts.iter().map(|p| (p - mean) * (p - mean)).sum::<f64>() / (CIRCLE_SETS * (CIRCLE_SETS - 1)) as f64;
+    CIRCLE_SETS_CORRELATION * sqrt(square) * CIRCLE_SETS as f64 / lines
 }
 
 /// The sums of the parts of twice as many lines, as far as they are done.
-fn gathered(&[a, b, c, d]: &[f64; PARTS], sets: u32) -> [f64; PARTS] {
+fn gathered(&[a, b, c, d]: &[f64; CIRCLE_SETS], sets: u32) -> [f64; CIRCLE_SETS] {
     // of one set every other half circle goes on as a part
     if sets == 1 { [a + c, b + d, 0.0, 0.0] } else { [a + b, c + d, 0.0, 0.0] }
 }

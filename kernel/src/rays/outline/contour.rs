@@ -1,7 +1,7 @@
 //! The sum over all counted facets that rise above a point, by their outlines.
 
 use super::candidates::{Active, Frame};
-use super::{Basis, Block, SLACK};
+use super::{Basis, Block, OUTLINE_HEIGHT_SLACK};
 use crate::base::math::{PI, TAU, Vec3, asin};
 use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
 use crate::form_factor::angle::wide_angle;
@@ -46,7 +46,7 @@ impl WideTask for Sweep<'_> {
         let back = lanes.all(back);
         let p = spread(lanes, frame.point);
         let axes = [spread(lanes, frame.axes[0]), spread(lanes, frame.axes[1]), spread(lanes, frame.axes[2])];
-        let (zero, one, slack) = (lanes.all(0.0), lanes.all(1.0), lanes.all(SLACK));
+        let (zero, one, slack) = (lanes.all(0.0), lanes.all(1.0), lanes.all(OUTLINE_HEIGHT_SLACK));
         let (mut count, mut body, mut alone) = (0, f64::NAN, true);
         for block in blocks {
             let row = |k: usize| lanes.of(&block[k]);

@@ -240,7 +240,7 @@ fn put(
     &[_, first, second]: &Pair,
 ) {
     let (low, high, _) = ends(corners, first);
-    let mut values = [0.0; super::ROWS];
+    let mut values = [0.0; super::EDGE_BLOCK_ROWS];
     let mut lay =
         |start: usize, v: [f64; 3]| v.into_iter().enumerate().for_each(|(k, x)| values.set(start + k, x));
     lay(0, low.to_array());

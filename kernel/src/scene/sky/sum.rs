@@ -99,7 +99,7 @@ fn heights<L: Lanes>(lanes: L, packed: &[u32], up: Vec3) -> Sums {
 /// Adds eight directions but for the first `before`.
 #[inline(always)]
 fn add<L: Lanes>(lanes: L, packed: &[u32; N], up: [L::F8; 3], before: usize, sums: &mut [L::F8; 3]) {
-    const PLACES: [f32; N] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+    const LANE_NUMBERS: [f32; N] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
     let (zero, steps) = (lanes.splat8(0.0), lanes.splat8(octahedron::steps(SKY_BITS) as f32));
     let negative = |a| lanes.sub8(zero, a);
     // in whole half steps, exactly
@@ -117,7 +117,7 @@ fn add<L: Lanes>(lanes: L, packed: &[u32; N], up: [L::F8; 3], before: usize, sum
         let [x, y, z] = [0, 1, 2].map(|i| lanes.mul8(a[i], b[i]));
         lanes.add8(lanes.add8(x, y), z)
     };
-    let (direction, keep) = ([x, y, z], lanes.mask8(lanes.splat8(before as f32), lanes.load8(&PLACES)));
+    let (direction, keep) = ([x, y, z], lanes.mask8(lanes.splat8(before as f32), lanes.load8(&LANE_NUMBERS)));
     let height = lanes.div8(dot(direction, up), lanes.root8(dot(direction, direction)));
     let above = lanes.mask8(zero, height);
     for (sum, value) in sums.iter_mut().zip([

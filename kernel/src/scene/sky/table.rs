@@ -1,6 +1,6 @@
 //! Skies given by samples, bilinear in elevation and azimuth.
 
-use super::{LARGEST, SkyTable};
+use super::{RADIANCE_LARGEST, SkyTable};
 use crate::base::error::{Error, Field};
 use crate::base::index::{Index, parts};
 use crate::base::math::{FRAC_PI_2, PI, TAU, Vec3, acos, atan2, clamp, cos, fabs, floor, sin, sqrt, unit};
@@ -106,7 +106,7 @@ impl<'a> Table<'a> {
                 if !(value >= 0.0 && value.is_finite()) {
                     return Err(Error::Range { field, band, value });
                 }
-                if value * factor(band) > LARGEST {
+                if value * factor(band) > RADIANCE_LARGEST {
                     return Err(Error::Range { field, band, value: value * factor(band) });
                 }
             }

@@ -10,34 +10,34 @@ use crate::rays::bvh::HalfSpace;
 use crate::rays::surface::Surface;
 
 /// What irradiance over pi may be wrong by beside such things, relative to the reference radiance.
-pub(super) const CROWDED: f64 = 0.1;
+pub(super) const FINE_DETAIL_ERROR: f64 = 0.1;
 
 /// Pixels that an element fills from which on a view may show what its rays have missed.
 const PIXELS: f64 = 16.0;
 
 /// Facets are small up to this part of an element's size, and near up to so many times their own.
-const SMALL: f64 = 0.125;
-const NEAR: f64 = 5.0;
+const DETAIL_SIZE_MOST: f64 = 0.125;
+const DETAIL_DISTANCE_MOST: f64 = 5.0;
 
 /// Facets that are looked at. Where there are more, they count as small things if the element fills so many pixels that the
 /// view is of its surroundings, else as parts of larger ones.
-const MOST: u32 = 64;
+const DETAIL_FACETS_MOST: u32 = 64;
 const LARGE: f64 = 256.0;
 
 /// Elements that are remembered.
-const KEPT: usize = if GATHERS { 64 } else { 0 };
+const DETAIL_ELEMENTS_KEPT: usize = if GATHERS { 64 } else { 0 };
 
 plain_table! {
     /// What is known of the elements that were asked about latest.
     pub struct Surroundings {
         /// Each at its number's place: twice the unknown's number and 2, and 1 where small facets may stand near it.
-        pub known: [u64; KEPT],
+        pub known: [u64; DETAIL_ELEMENTS_KEPT],
     }
 }
 
 impl Surroundings {
     /// Nothing is known.
-    pub const ZERO: Surroundings = Surroundings { known: [0; KEPT] };
+    pub const ZERO: Surroundings = Surroundings { known: [0; DETAIL_ELEMENTS_KEPT] };
 }
 
 impl Solved<'_> {
@@ -64,7 +64,7 @@ impl Solved<'_> {
     /// The same of any of its points, or because there are too many facets to tell.
     #[inline]
     fn element_is_crowded(&self, unknown: usize, near: &Near, known: &mut Surroundings) -> bool {
-        let (place, name) = (unknown % KEPT.max(1), 2 * (unknown as u64 + 1));
+        let (place, name) = (unknown % DETAIL_ELEMENTS_KEPT.max(1), 2 * (unknown as u64 + 1));
         if known.known.at(place) & !1 != name {
             let corners = self.elements.corners(self.scene, unknown / self.scene.sides());
             let crowded = self.small_near(near, &corners);
@@ -77,7 +77,7 @@ impl Solved<'_> {
     #[inline(never)]
     fn small_near(&self, near: &Near, corners: &[Vec3; 3]) -> bool {
         let (x, y) = frame(near.normal);
-        let reach = NEAR * SMALL * near.size;
+        let reach = DETAIL_DISTANCE_MOST * DETAIL_SIZE_MOST * near.size;
         let half = |normal: Vec3, below: f64| {
             let least = corners.iter().map(|corner| corner.dot(normal)).fold(f64::INFINITY, f64::min);
             HalfSpace { normal, height: least - below }
@@ -96,9 +96,9 @@ impl Solved<'_> {
             let Some((own, _)) = self.bvh.corners(facet) else { return true };
             found = near.is_small(&own, corners[0], alone);
             seen += 1;
-            !found && seen < MOST
+            !found && seen < DETAIL_FACETS_MOST
         });
-        found || near.many && seen >= MOST
+        found || near.many && seen >= DETAIL_FACETS_MOST
     }
 }
 
@@ -118,7 +118,7 @@ impl Near {
         let own = (a - b).length_squared().max((b - c).length_squared()).max((c - a).length_squared());
         let distance = (a + b + c).length_squared() / 9.0;
         let above = [a, b, c].iter().any(|corner| corner.dot(self.normal) > 0.01 * sqrt(own));
-        let near = !alone || distance < NEAR * NEAR * own;
-        own < SMALL * SMALL * self.size * self.size && near && above
+        let near = !alone || distance < DETAIL_DISTANCE_MOST * DETAIL_DISTANCE_MOST * own;
+        own < DETAIL_SIZE_MOST * DETAIL_SIZE_MOST * self.size * self.size && near && above
     }
 }

@@ -32,35 +32,35 @@ pub(crate) const CAUTION: f64 = 1.9;
 
 /// Fewest rays from a point: where they find reflected light alone, and where they find the sky, too, of which fewer may all
 /// miss what little is bright.
-pub(super) const FEWEST: (f64, f64) = (32.0, 128.0);
+pub(super) const GATHER_RAYS_FEWEST: (f64, f64) = (32.0, 128.0);
 
 /// Most rays from a point.
-const MOST: f64 = 65536.0;
+const GATHER_RAYS_MOST: f64 = 65536.0;
 
 /// The fewest and the most, in rays that half a bright hemisphere takes.
 const LEAST_TIMES: f64 = 0.25;
-const MOST_TIMES: f64 = 4.0;
+const GATHER_RAYS_FACTOR_MOST: f64 = 4.0;
 
 /// Parts of them.
-const PARTS: usize = 8;
+const GATHER_SETS: usize = 8;
 
 /// Error to reach, in tolerances.
 const GOAL: f64 = 0.55;
 
 /// Rays from points find what lobes up to this axis ratio throw of the sun; what narrower ones throw, few of them see.
-const WIDE: f64 = 20.0;
+const GATHER_LOBE_RATIO_MOST: f64 = 20.0;
 
 /// Square of the expected error of the mean of all rays over what it comes to: what is small and bright, or dark, few of them
 /// see.
-const DOUBT: f64 = 2.4;
+const GATHER_ERROR_FACTOR2: f64 = 2.4;
 
 /// Square of what the parts of the rays tell as if they were independent over that of the error of their mean, the root of
-/// [`PARTS`] where errors go with n^-3/4: each part fills what the others leave out. In stairs, fins and nested boxes of
+/// [`GATHER_SETS`] where errors go with n^-3/4: each part fills what the others leave out. In stairs, fins and nested boxes of
 /// reflectance 0.5 to 0.8 it is 3.5.
 const STRATIFIED: f64 = 2.83;
 
 /// Rays go on diffusely from elements whose root of the area is more than this share of the ray.
-const SHORT: f64 = 1.0;
+const ONWARD_SIZE_MOST: f64 = 1.0;
 
 /// The most times that a ray goes on: in a corner half of the light does each time.
 const MOST_ONWARD: u32 = 8;
@@ -74,7 +74,7 @@ const MIXED: f64 = 0.7;
 const COHERENT: f64 = 0.4;
 
 /// Elements of one pixel whose corrections are kept.
-pub(super) const KEPT: usize = if GATHERS { 8 } else { 0 };
+pub(super) const PIXEL_ELEMENTS_KEPT: usize = if GATHERS { 8 } else { 0 };
 
 plain_table! {
     /// What rays from points have brought, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
@@ -88,15 +88,15 @@ plain_table! {
         /// The sky in its direction.
         pub sky: [f64; BANDS],
         /// Sums over the rays of each part: what they bring beyond the sky that they would see were nothing in their way.
-        pub beyond: [[f64; BANDS]; PARTS],
+        pub beyond: [[f64; BANDS]; GATHER_SETS],
         /// The same of that sky.
-        pub open: [[f64; BANDS]; PARTS],
+        pub open: [[f64; BANDS]; GATHER_SETS],
         /// By how much the elements that were gathered on differ from their linear functions.
-        pub corrections: [[f64; BANDS]; KEPT],
+        pub corrections: [[f64; BANDS]; PIXEL_ELEMENTS_KEPT],
         /// Expected squared errors of the irradiance over pi that are left.
-        pub errors: [f64; KEPT],
+        pub errors: [f64; PIXEL_ELEMENTS_KEPT],
         /// The unknowns.
-        pub unknowns: [u64; KEPT],
+        pub unknowns: [u64; PIXEL_ELEMENTS_KEPT],
         /// Sums of the expected errors of what the rays met, with each set of signs.
         pub carried: [f64; SIGNS],
         /// Rays that met something.
@@ -117,11 +117,11 @@ impl Gathered {
         through: [[0.0; MAX_BANDS]; GATHERS as usize],
         onward: [[0.0; MAX_BANDS]; GATHERS as usize],
         sky: [0.0; BANDS],
-        beyond: [[0.0; BANDS]; PARTS],
-        open: [[0.0; BANDS]; PARTS],
-        corrections: [[0.0; BANDS]; KEPT],
-        errors: [0.0; KEPT],
-        unknowns: [0; KEPT],
+        beyond: [[0.0; BANDS]; GATHER_SETS],
+        open: [[0.0; BANDS]; GATHER_SETS],
+        corrections: [[0.0; BANDS]; PIXEL_ELEMENTS_KEPT],
+        errors: [0.0; PIXEL_ELEMENTS_KEPT],
+        unknowns: [0; PIXEL_ELEMENTS_KEPT],
         carried: [0.0; SIGNS],
         hits: 0,
         count: 0,
@@ -154,16 +154,16 @@ impl Gathered {
 
     /// Mean of one band over all of `rays` rays, with the exact sky or with theirs, and the square of its expected error.
     fn mean(&self, band: usize, rays: u32, exact: bool) -> (f64, f64) {
-        let each = f64::from(rays) / PARTS as f64;
+        let each = f64::from(rays) / GATHER_SETS as f64;
         let open = if exact { 0.0 } else { 1.0 };
         let of = |part: usize| {
             let [beyond, open_sky] =
                 [&self.beyond, &self.open].map(|sums| sums.get(part).map_or(0.0, |p| p.at(band)));
             (beyond + open * open_sky) / each
         };
-        let mean = (0..PARTS).map(of).sum::<f64>() / PARTS as f64;
-        let squares = (0..PARTS).map(|part| (of(part) - mean) * (of(part) - mean)).sum::<f64>();
-        (mean, squares / (STRATIFIED * (PARTS * (PARTS - 1)) as f64))
+        let mean = (0..GATHER_SETS).map(of).sum::<f64>() / GATHER_SETS as f64;
+        let squares = (0..GATHER_SETS).map(|part| (of(part) - mean) * (of(part) - mean)).sum::<f64>();
+        (mean, squares / (STRATIFIED * (GATHER_SETS * (GATHER_SETS - 1)) as f64))
     }
 
     /// The square of the expected error of all bands, relative to the reference, the largest.
@@ -175,7 +175,7 @@ impl Gathered {
     /// Two parts each become one, and make room for two new ones.
     fn halve(&mut self) {
         for sums in [&mut self.beyond, &mut self.open] {
-            for part in 0..PARTS {
+            for part in 0..GATHER_SETS {
                 let [a, b] =
                     [2 * part, 2 * part + 1].map(|from| sums.get(from).copied().unwrap_or([0.0; BANDS]));
                 let to = sums.get_mut(part).into_iter().flatten();
@@ -186,7 +186,7 @@ impl Gathered {
 }
 
 /// Where an unknown stands among the first `count` that are kept of a pixel.
-pub(super) fn find(unknowns: &[u64; KEPT], count: u64, unknown: usize) -> Option<usize> {
+pub(super) fn find(unknowns: &[u64; PIXEL_ELEMENTS_KEPT], count: u64, unknown: usize) -> Option<usize> {
     unknowns.iter().take(count as usize).position(|own| *own == unknown as u64)
 }
 
@@ -265,7 +265,7 @@ impl Solved<'_> {
         let mut materials = 0..self.scene.materials();
         self.scene.largest_specular() == 0.0
             || !self.scene.is_smooth()
-                && materials.all(|m| self.scene.gloss(m).is_none_or(|ratio| ratio <= WIDE))
+                && materials.all(|m| self.scene.gloss(m).is_none_or(|ratio| ratio <= GATHER_LOBE_RATIO_MOST))
     }
 
     /// By how much the irradiance at a point differs from its element's, one value a band, and the expected squared error
@@ -284,7 +284,7 @@ impl Solved<'_> {
             Some(place) => place,
             None => {
                 let place = gathered.count as usize;
-                if place >= KEPT {
+                if place >= PIXEL_ELEMENTS_KEPT {
                     return None;
                 }
                 let (exact, rays) = self.trace(spot, images, gathered, how, path)?;
@@ -315,9 +315,10 @@ impl Solved<'_> {
         let axes = frame(spot.surface.normal);
         let tolerance = self.settings.budget.image / spot.weight;
         let goal = (GOAL * tolerance) * (GOAL * tolerance);
-        let fewest = if spot.open.is_some() { FEWEST.0 } else { FEWEST.1 };
-        let least = clamp(LEAST_TIMES * usual_rays(tolerance / self.spread_at(spot)), fewest, MOST);
-        let most = clamp(MOST_TIMES * usual_rays(tolerance), fewest, MOST) as u32;
+        let fewest = if spot.open.is_some() { GATHER_RAYS_FEWEST.0 } else { GATHER_RAYS_FEWEST.1 };
+        let least =
+            clamp(LEAST_TIMES * usual_rays(tolerance / self.spread_at(spot)), fewest, GATHER_RAYS_MOST);
+        let most = clamp(GATHER_RAYS_FACTOR_MOST * usual_rays(tolerance), fewest, GATHER_RAYS_MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
         gathered.sky.fill(0.0);
         gathered.carried = [0.0; SIGNS];
@@ -329,7 +330,7 @@ impl Solved<'_> {
                 let (p, q) = sequence.pair(index, 0);
                 let (a, b, c) = cosine_direction(p, q);
                 let direction = axes.0 * a + axes.1 * b + spot.surface.normal * c;
-                let part = (u64::from(index) * PARTS as u64 / u64::from(rays)) as usize;
+                let part = (u64::from(index) * GATHER_SETS as u64 / u64::from(rays)) as usize;
                 let sample = Sample::OneOf { seed, index };
                 let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
                 self.add_direction((spot, direction), part, images, gathered, &mut how, path)?;
@@ -429,7 +430,10 @@ impl Solved<'_> {
     ) -> bool {
         let (Some(onward), Sample::OneOf { seed, index }) = (&mut leg.onward, sample) else { return false };
         let area = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
-        if onward.ray.is_some() || onward.depth >= MOST_ONWARD || leg.step * leg.step > SHORT * SHORT * area {
+        if onward.ray.is_some()
+            || onward.depth >= MOST_ONWARD
+            || leg.step * leg.step > ONWARD_SIZE_MOST * ONWARD_SIZE_MOST * area
+        {
             return false;
         }
         // the first along with the ray's own direction, coordinates 0 and 1; lobes have taken these
@@ -471,6 +475,6 @@ impl Solved<'_> {
         let [apart @ .., alike] =
             gathered.carried.map(|sum| (sum / f64::from(rays)) * (sum / f64::from(rays)));
         let carried = MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + COHERENT * alike;
-        (DOUBT * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
+        (GATHER_ERROR_FACTOR2 * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
     }
 }

@@ -4,7 +4,7 @@ use super::Solved;
 use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
-use crate::radiosity::sun_image::{Image, Nearby, SAME};
+use crate::radiosity::sun_image::{Image, Nearby, SUN_DISTANCE_LEAST};
 use crate::rays::bvh::HalfSpace;
 use crate::rays::outline::Candidates;
 use crate::rays::surface::{OFFSET, Surface};
@@ -33,13 +33,13 @@ impl Toward {
 }
 
 /// The most facets that a way names.
-const MOST: usize = 13;
+const OCCLUDERS_MOST: usize = 13;
 
 /// Ways that are remembered, a power of 2.
 const WAYS: usize = 512;
 
 /// In place of a count: too many.
-const CROWDED: u32 = u32::MAX;
+const OCCLUDERS_TOO_MANY: u32 = u32::MAX;
 
 plain_struct! {
     /// What may stand before one side of a facet in one direction.
@@ -48,10 +48,10 @@ plain_struct! {
         pub side: u32,
         /// [`Toward::number`]; 0: an empty place.
         pub toward: u32,
-        /// Facets that may be in the way, or [`CROWDED`]; toward an image of the sun: mirrors in the way that may show it.
+        /// Facets that may be in the way, or [`OCCLUDERS_TOO_MANY`]; toward an image of the sun: mirrors in the way that may show it.
         pub count: u32,
         /// Which.
-        pub facets: [u32; MOST],
+        pub facets: [u32; OCCLUDERS_MOST],
     }
 }
 
@@ -189,7 +189,7 @@ impl<'m> Outlook<'m> {
             *way = Way { side, toward, ..Way::default() };
             way.look(solved, surface, direction, spread);
         }
-        if way.count == CROWDED { None } else { Some(way.facets.head(way.count as usize)) }
+        if way.count == OCCLUDERS_TOO_MANY { None } else { Some(way.facets.head(way.count as usize)) }
     }
 }
 
@@ -201,7 +201,7 @@ impl Way {
     /// Finds what reaches into the region that the facet sweeps along the directions, from where rays start above it.
     #[inline(never)]
     fn look(&mut self, solved: &Solved<'_>, surface: &Surface, direction: Vec3, spread: f64) {
-        self.count = CROWDED;
+        self.count = OCCLUDERS_TOO_MANY;
         let corners = solved.scene.corners().at(surface.facet);
         let normal = surface.normal;
         let top = corners.iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
@@ -225,9 +225,9 @@ impl Way {
             }
             facets.set(count, facet);
             count += 1;
-            count <= MOST
+            count <= OCCLUDERS_MOST
         });
-        self.count = if count <= MOST { count as u32 } else { CROWDED };
+        self.count = if count <= OCCLUDERS_MOST { count as u32 } else { OCCLUDERS_TOO_MANY };
     }
 }
 
@@ -246,7 +246,7 @@ impl Solved<'_> {
         let Some(normal) = self.scene.flat_normal(facet, side) else { return false };
         let mirrored = reflect(axis, normal);
         let place = facet * self.scene.sides() + side;
-        1.0 - mirrored.dot(sun.direction()) < SAME
+        1.0 - mirrored.dot(sun.direction()) < SUN_DISTANCE_LEAST
             || self.images.may_show(self.elements.facet_sides(), place, mirrored)
     }
 }

@@ -1,6 +1,6 @@
 //! The sky that a point sees straight, by outlines, in place of what its element holds of it.
 
-use super::gather::{BANDS, KEPT, find};
+use super::gather::{BANDS, PIXEL_ELEMENTS_KEPT, find};
 use super::{Outlook, Solved, linear};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
@@ -10,7 +10,7 @@ use crate::radiosity::straight;
 use crate::rays::surface::Surface;
 
 /// Part of the tolerance that circles may leave at a point.
-const PART: f64 = 0.25;
+const CIRCLES_ERROR_SHARE: f64 = 0.25;
 
 /// Part of the tolerance that an element's linear function may leave of the straight sky at a point.
 const LOOK: f64 = 0.25;
@@ -23,11 +23,11 @@ plain_table! {
     /// The straight sky at the first point of some elements in one pixel.
     pub struct KeptSkies {
         /// Irradiance beyond the element's linear function.
-        pub beyond: [[f64; BANDS]; KEPT],
+        pub beyond: [[f64; BANDS]; PIXEL_ELEMENTS_KEPT],
         /// Whether it is known, what is blocked beyond the element's linear function, and [`OpenAt::variance`].
-        pub rest: [[f64; 3]; KEPT],
+        pub rest: [[f64; 3]; PIXEL_ELEMENTS_KEPT],
         /// The unknowns.
-        pub unknowns: [u64; KEPT],
+        pub unknowns: [u64; PIXEL_ELEMENTS_KEPT],
         /// Elements that are kept.
         pub count: u64,
     }
@@ -35,8 +35,12 @@ plain_table! {
 
 impl KeptSkies {
     /// None.
-    pub const ZERO: KeptSkies =
-        KeptSkies { beyond: [[0.0; BANDS]; KEPT], rest: [[0.0; 3]; KEPT], unknowns: [0; KEPT], count: 0 };
+    pub const ZERO: KeptSkies = KeptSkies {
+        beyond: [[0.0; BANDS]; PIXEL_ELEMENTS_KEPT],
+        rest: [[0.0; 3]; PIXEL_ELEMENTS_KEPT],
+        unknowns: [0; PIXEL_ELEMENTS_KEPT],
+        count: 0,
+    };
 
     fn find(&self, unknown: usize) -> Option<usize> {
         find(&self.unknowns, self.count, unknown)
@@ -91,7 +95,7 @@ impl<'a> Solved<'a> {
         }
         let open = self.open_at(surface, unknown, local, outlook);
         let place = kept.count as usize;
-        if place < KEPT {
+        if place < PIXEL_ELEMENTS_KEPT {
             kept.unknowns.set(place, unknown as u64);
             kept.count += 1;
             let Some(open) = &open else {
@@ -138,7 +142,7 @@ impl<'a> Solved<'a> {
             return None;
         }
         // whatever the point counts: bands of different weights get the same bits
-        let goal = PART * self.settings.budget.image;
+        let goal = CIRCLES_ERROR_SHARE * self.settings.budget.image;
         let open = candidates.open(self.scene, self.bvh, surface.point, basis, goal)?;
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
@@ -156,7 +160,7 @@ fn blocked_by_element(held: &[f64], bands: usize, local: Local) -> f64 {
 /// By what all else that arrives counts where this share of the hemisphere is blocked, beside that by an element's linear
 /// function; `None` where they are far apart.
 fn ratio(blocked: f64, by_element: f64) -> Option<f64> {
-    let same = fabs(blocked - by_element) < straight::SAME;
+    let same = fabs(blocked - by_element) < straight::BLOCKED_ROUNDING;
     let ratio = if same { 1.0 } else { blocked / by_element };
     (1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio).then_some(ratio)
 }

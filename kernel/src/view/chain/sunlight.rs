@@ -5,8 +5,8 @@ use super::{How, Leg, Outlook, Path, Sample, Solved, Terms};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
-use crate::coupling::word::LONGEST;
-use crate::radiosity::sun_image::{Image, SAME};
+use crate::coupling::word::MIRRORS_MOST;
+use crate::radiosity::sun_image::{Image, SUN_DISTANCE_LEAST};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
 use crate::scene::lobe::{Highlight, Lobe};
@@ -24,7 +24,7 @@ const DISC_ERROR: f64 = 0.25;
 const SAMPLED: f64 = 0.1;
 
 /// The most times as many where more than the reference radiance is at stake.
-const MOST_TIMES: f64 = 32.0;
+const SUN_RAYS_FACTOR_MOST: f64 = 32.0;
 
 /// The most rays toward the sun's disc.
 const MOST_DISC_RAYS: u32 = 1024;
@@ -127,7 +127,7 @@ impl Solved<'_> {
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
         // what a highlight brings may be many times the reference radiance: an edge across the disc then shows far out
-        let most = (f64::from(most) * clamp(at_stake, 1.0, MOST_TIMES)) as u32;
+        let most = (f64::from(most) * clamp(at_stake, 1.0, SUN_RAYS_FACTOR_MOST)) as u32;
         let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.budget.image);
         (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
@@ -231,7 +231,7 @@ impl Solved<'_> {
         loop {
             path.rays += 1;
             let Some(hit) = self.bvh.closest(&ray) else {
-                return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SAME;
+                return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SUN_DISTANCE_LEAST;
             };
             let Some(surface) = Surface::of_hit(self.scene, &hit) else { return false };
             let Some(normal) = surface.flat_mirror(self.scene).filter(|_| mirrors < most) else {
@@ -243,14 +243,16 @@ impl Solved<'_> {
                 largest = f64::max(largest, *product);
             }
             // as far as beams are traced
-            if largest < self.settings.budget.beam_chains || mirrors as usize >= LONGEST {
+            if largest < self.settings.budget.beam_chains || mirrors as usize >= MIRRORS_MOST {
                 return false;
             }
             mirrors += 1;
             axis = reflect(axis, normal);
             let (sides, side) =
                 (self.elements.facet_sides(), surface.facet * self.scene.sides() + surface.side);
-            if 1.0 - axis.dot(sun.direction()) >= SAME && !self.images.may_show(sides, side, axis) {
+            if 1.0 - axis.dot(sun.direction()) >= SUN_DISTANCE_LEAST
+                && !self.images.may_show(sides, side, axis)
+            {
                 // what this mirror shows is no image of the sun
                 return false;
             }

@@ -15,11 +15,11 @@ const JUMP: f64 = 0.29;
 const SLOTS: usize = 20;
 
 /// Beside the values of a place: the place, its value's own squared error, the error of the interval to its left.
-const NOTES: usize = 3;
+const PLACE_NOTES: usize = 3;
 
 /// Memory of one integral of vectors of `stride` values.
 pub(super) const fn memory(stride: usize) -> usize {
-    SLOTS * (stride + NOTES)
+    SLOTS * (stride + PLACE_NOTES)
 }
 
 /// How values are compared.
@@ -90,7 +90,7 @@ pub(super) fn integrate(
     value: &mut dyn FnMut(f64, &mut [f64]) -> Option<f64>,
 ) -> Option<f64> {
     let stride = measure.stride();
-    let size = stride + NOTES;
+    let size = stride + PLACE_NOTES;
     let mut put = |memory: &mut [f64], slot: usize, x: f64| {
         put(memory.part_mut(slot * size..(slot + 1) * size), stride, x, value)
     };
@@ -139,7 +139,7 @@ fn put(
     value: &mut dyn FnMut(f64, &mut [f64]) -> Option<f64>,
 ) -> Option<()> {
     let square = value(x, node.head_mut(stride))?;
-    copy(node.part_mut(stride..stride + NOTES), &[x, square, -1.0]);
+    copy(node.part_mut(stride..stride + PLACE_NOTES), &[x, square, -1.0]);
     Some(())
 }
 

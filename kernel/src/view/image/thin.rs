@@ -1,6 +1,6 @@
 //! Sheets and wires seen edge on, which stand between pixel centres: found in the mesh, as no centre shows them.
 
-use super::{NOTES, Painter};
+use super::{PIXEL_NOTES, Painter};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, unit};
 use crate::rays::bvh::HalfSpace;
@@ -49,7 +49,7 @@ impl Painter<'_, '_> {
     /// Whether a pixel's centre shows no facet, or a black back.
     fn is_dark(&self, at: usize) -> bool {
         let terms = self.lines.part(at..at + 3 * self.solved.shape.bands);
-        self.lines.at(at + self.stride - NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
+        self.lines.at(at + self.stride - PIXEL_NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
     }
 
     /// Whether the front of a facet may reach into some pixels of a row.

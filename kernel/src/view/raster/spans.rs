@@ -25,7 +25,7 @@ plain_struct! {
 const BACK: u64 = 1 << 32;
 
 /// Most spans of a line.
-const MOST: usize = 1024;
+const LINE_SPANS_MOST: usize = 1024;
 
 /// Visible spans of some lines: the rows of [`Samples`], without shifts.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub struct Lines<'m> {
     spans: &'m mut [Span],
     /// Of each line, places of its spans from left to right, and then the places that are free.
     order: &'m mut [u16],
-    /// Spans of each line, more than [`MOST`]: too many; and where the latest stands.
+    /// Spans of each line, more than [`LINE_SPANS_MOST`]: too many; and where the latest stands.
     counts: &'m mut [[usize; 2]],
     spare: &'m mut [Span],
     first: isize,
@@ -42,8 +42,8 @@ pub struct Lines<'m> {
 impl<'m> Lines<'m> {
     /// Adds what so many lines take.
     pub const fn need(need: Need, lines: usize) -> Need {
-        let size = lines.saturating_mul(MOST);
-        need.and::<Span>(size).and::<u16>(size).and::<[usize; 2]>(lines).and::<Span>(MOST)
+        let size = lines.saturating_mul(LINE_SPANS_MOST);
+        need.and::<Span>(size).and::<u16>(size).and::<[usize; 2]>(lines).and::<Span>(LINE_SPANS_MOST)
     }
 
     /// Takes memory for so many lines from the arena.
@@ -51,19 +51,19 @@ impl<'m> Lines<'m> {
     /// # Errors
     /// [`Error::BufferTooSmall`] where the arena has less than [`Lines::need`].
     pub fn new(arena: &mut Arena<'m>, lines: usize) -> Result<Lines<'m>, Error> {
-        let size = lines.saturating_mul(MOST);
+        let size = lines.saturating_mul(LINE_SPANS_MOST);
         let (spans, order, counts) = (arena.take(size)?, arena.take::<u16>(size)?, arena.take(lines)?);
-        order.iter_mut().enumerate().for_each(|(n, place)| *place = (n % MOST) as u16);
-        Ok(Lines { spans, order, counts, spare: arena.take(MOST)?, first: 0 })
+        order.iter_mut().enumerate().for_each(|(n, place)| *place = (n % LINE_SPANS_MOST) as u16);
+        Ok(Lines { spans, order, counts, spare: arena.take(LINE_SPANS_MOST)?, first: 0 })
     }
 
     /// The spans of a row of those found last, from left to right; `None` where they are too many.
     pub fn of(&self, row: isize) -> Option<impl Iterator<Item = Span> + Clone> {
         let line = (row - self.first) as usize;
         let [count, _] = self.counts.at(line);
-        let spans = self.spans.part(line * MOST..(line + 1) * MOST);
-        let order = self.order.part(line * MOST..line * MOST + count);
-        (count <= MOST).then(|| order.iter().map(|&place| spans.at(usize::from(place))))
+        let spans = self.spans.part(line * LINE_SPANS_MOST..(line + 1) * LINE_SPANS_MOST);
+        let order = self.order.part(line * LINE_SPANS_MOST..line * LINE_SPANS_MOST + count);
+        (count <= LINE_SPANS_MOST).then(|| order.iter().map(|&place| spans.at(usize::from(place))))
     }
 
     /// Finds what is nearest on rows of parallel samples, as many as there is room for at most, of as many rows as
@@ -104,9 +104,9 @@ impl<'m> Lines<'m> {
         let new = Span { start: start - x, end: end - x, near, key };
         let line = (row - self.first) as usize;
         let Some([count, near]) = self.counts.get_mut(line) else { return };
-        let all = line * MOST..(line + 1) * MOST;
+        let all = line * LINE_SPANS_MOST..(line + 1) * LINE_SPANS_MOST;
         let mut own = Line { spans: self.spans.part_mut(all.clone()), order: self.order.part_mut(all) };
-        *count = own.insert((*count, near), &new, self.spare, view.depth).unwrap_or(MOST + 1);
+        *count = own.insert((*count, near), &new, self.spare, view.depth).unwrap_or(LINE_SPANS_MOST + 1);
     }
 }
 
@@ -146,7 +146,7 @@ impl Line<'_> {
         spare: &mut [Span],
         margin: f64,
     ) -> Option<usize> {
-        if count > MOST {
+        if count > LINE_SPANS_MOST {
             return None;
         }
         let first = self.find(count, *near, new.start);
@@ -184,7 +184,7 @@ impl Line<'_> {
         }
         let (made, gone) = (pieces.count, last - first);
         let total = count - gone + made;
-        if total > MOST {
+        if total > LINE_SPANS_MOST {
             return None;
         }
         // free places come in, or go

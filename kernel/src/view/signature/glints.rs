@@ -16,26 +16,26 @@ use crate::scene::{MAX_BANDS, Scene};
 use crate::view::chain::{APART, Path, Solved};
 
 /// Facets of one row of a view that looks for glints.
-pub(super) const FACETS: usize = 64;
+pub(super) const GLINT_FACETS: usize = 64;
 
 /// Halvings of a facet's sides at most.
-const DEEPEST: u32 = 9;
+const GLINT_HALVINGS_MOST: u32 = 9;
 
 /// Parts that wait at most: three of each halving, and one.
-const WAITING: usize = 3 * DEEPEST as usize + 1;
+const GLINT_PARTS_WAITING: usize = 3 * GLINT_HALVINGS_MOST as usize + 1;
 
 /// A part over which the mirrored direction bends by less than this, in half angles of the disc, is linear: its glint is
 /// off by some such share.
 const BEND: f64 = 0.004;
 
 /// A part may show so many times the disc.
-const WIDE: f64 = 1.5;
+const GLINT_WIDTH_FACTOR: f64 = 1.5;
 
 /// Lines across a part, and where rays from them disagree.
-const LINES: (u32, u32) = (64, 1024);
+const GLINT_LINES: (u32, u32) = (64, 1024);
 
 /// Sums over parts of a lobe: those whose angle is less than this share of that to the disc are small.
-const SMALL: f64 = 0.3;
+const LOBE_PART_ANGLE_MOST: f64 = 0.3;
 
 /// What a part may bring, in tolerances of the reference radiance over the whole view, to be halved no more.
 const FAINT: f64 = 1e-3;
@@ -109,8 +109,8 @@ impl Glints<'_, '_> {
     /// Adds what the facets of a row show.
     pub fn row(&mut self, row: usize, sums: &mut Sums) {
         let scene = self.solved.scene;
-        let end = ((row + 1) * FACETS).min(scene.facets());
-        for facet in row * FACETS..end {
+        let end = ((row + 1) * GLINT_FACETS).min(scene.facets());
+        for facet in row * GLINT_FACETS..end {
             if !is_apart(scene, scene.material(facet)) || scene.areas().at(facet) == 0.0 {
                 continue;
             }
@@ -158,13 +158,13 @@ impl Glints<'_, '_> {
         mut leaf: impl FnMut(&mut Self, &Part),
     ) {
         let facet = Part { corners: [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth: 0 };
-        let (mut waiting, mut count) = ([facet; WAITING], 1);
+        let (mut waiting, mut count) = ([facet; GLINT_PARTS_WAITING], 1);
         while count > 0 {
             count -= 1;
             let Some(&part) = waiting.get(count) else { return };
             match halves(self, &part) {
                 None => {}
-                Some(true) if part.depth < DEEPEST => {
+                Some(true) if part.depth < GLINT_HALVINGS_MOST => {
                     for quarter in part.quarters() {
                         waiting.set(count, quarter);
                         count += 1;
@@ -188,7 +188,7 @@ impl Glints<'_, '_> {
                 return None;
             }
             let bend = (ends[0] + ends[1] + ends[2]) / 3.0 - middle;
-            Some(sqrt(bend.length_squared()) > BEND * radius || reach > WIDE * radius)
+            Some(sqrt(bend.length_squared()) > BEND * radius || reach > GLINT_WIDTH_FACTOR * radius)
         };
         let (first, second) = frame(axis);
         self.parts(halves, |this, part| {
@@ -213,7 +213,7 @@ impl Glints<'_, '_> {
     ) {
         let bands = self.solved.shape.bands;
         let sequence = Sequence::new(hash2(seen.facet as u32, part.depth));
-        let mut lines = LINES.0;
+        let mut lines = GLINT_LINES.0;
         loop {
             let (mut all, mut lit) = (0.0, 0.0);
             self.products[1].head_mut(bands).fill(0.0);
@@ -234,7 +234,7 @@ impl Glints<'_, '_> {
                 }
             }
             let partly = lit > 0.0 && lit < all;
-            if partly && lines < LINES.1 {
+            if partly && lines < GLINT_LINES.1 {
                 lines *= 4;
                 continue;
             }
@@ -259,7 +259,7 @@ impl Glints<'_, '_> {
             let nearest = (off - 1.5 * reach).max(0.0);
             // the lobe as high as at the nearest point
             let most = lobe.value(1.0 - 0.5 * nearest * nearest);
-            Some(reach > SMALL * (off + width) && brings(most, part) > faint)
+            Some(reach > LOBE_PART_ANGLE_MOST * (off + width) && brings(most, part) > faint)
         };
         self.parts(halves, |this, part| this.points(seen, lobe, part, (scale, faint), sums));
     }
@@ -278,7 +278,7 @@ impl Glints<'_, '_> {
         let (mut all, mut lit, mut count, mut goal) = (0.0, 0.0, 0u32, 1);
         self.products[1].head_mut(bands).fill(0.0);
         while count < goal {
-            let [u, v] = POINTS.at(count as usize % POINTS.len());
+            let [u, v] = QUADRATIC_POINTS.at(count as usize % QUADRATIC_POINTS.len());
             let (surface, mirrored) = self.mirrored(seen, part.at(u, v));
             let highlight = Highlight::new(lobe, mirrored, &seen.sun);
             let value = highlight.map_or_else(|| lobe.value(mirrored.dot(seen.sun.direction())), |h| h.value);
@@ -293,7 +293,7 @@ impl Glints<'_, '_> {
             count += 1;
             // what brings little is looked at once
             if count == 1 && scale * value * part.share() * seen.area > faint {
-                goal = POINTS.len() as u32;
+                goal = QUADRATIC_POINTS.len() as u32;
             }
         }
         let share = 1.0 / f64::from(count);
@@ -349,7 +349,8 @@ impl Glints<'_, '_> {
 }
 
 /// Points of a part whose mean is exact for quadratic functions.
-const POINTS: [[f64; 2]; 3] = [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
+const QUADRATIC_POINTS: [[f64; 2]; 3] =
+    [[1.0 / 6.0, 1.0 / 6.0], [2.0 / 3.0, 1.0 / 6.0], [1.0 / 6.0, 2.0 / 3.0]];
 
 /// The part of a line from `start` over `along` that is in the unit circle.
 fn chord(start: (f64, f64), along: (f64, f64)) -> Option<(f64, f64)> {
