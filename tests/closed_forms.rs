@@ -239,11 +239,11 @@ fn by_quads(geometry: &Geometry<'_>, quads: usize) -> (Vec<Vec<f64>>, Vec<f64>) 
         let share = 0.5 * elements.share(unknown);
         for record in row.targets {
             let source = elements.facet_of(record.unknown()).0 / 2;
-            factors[quad][source] += share * record.weight * row.products(record.word())[0];
+            factors[quad][source] += share * record.weight * row.products(record.path())[0];
         }
         light[quad] += if row.row.state == ENCLOSED { 0.0 } else { share };
         for bundle in row.escapes {
-            let factor = if bundle.word == BLOCKED { -1.0 } else { row.products(bundle.word)[0] };
+            let factor = if bundle.path == BLOCKED { -1.0 } else { row.products(bundle.path)[0] };
             light[quad] += share * bundle.total() * factor;
         }
     }

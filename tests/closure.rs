@@ -20,17 +20,17 @@ struct Shares {
 fn shares(row: &RowView<'_>) -> Shares {
     let sum = |records: &mut dyn Iterator<Item = f64>| records.sum::<f64>();
     Shares {
-        straight: sum(&mut row.targets.iter().filter(|r| row.depth(r.word()) == 0).map(|r| r.weight)),
+        straight: sum(&mut row.targets.iter().filter(|r| row.depth(r.path()) == 0).map(|r| r.weight)),
         blocked: row.row.blocked,
         mirrored: sum(&mut row
             .targets
             .iter()
-            .filter(|r| row.depth(r.word()) > 0)
-            .map(|r| r.weight * row.products(r.word())[0]))
+            .filter(|r| row.depth(r.path()) > 0)
+            .map(|r| r.weight * row.products(r.path())[0]))
             + sum(&mut row
                 .escapes
-                .filter(|b| row.depth(b.word) > 0)
-                .map(|b| b.total() * row.products(b.word)[0])),
+                .filter(|b| row.depth(b.path) > 0)
+                .map(|b| b.total() * row.products(b.path)[0])),
     }
 }
 
@@ -94,16 +94,20 @@ fn rows_through_mirrors_close_too() {
                 let kept = row.targets.iter().map(|r| {
                     let facet = elements.facet_of(r.unknown()).0;
                     let specular = geometry.scene().specular(geometry.scene().material(facet))[0];
-                    r.weight * row.products(r.word())[0] * (1.0 - specular)
+                    r.weight * row.products(r.path())[0] * (1.0 - specular)
                 });
-                let through = row.escapes.filter(|b| row.depth(b.word) > 0);
-                let through: f64 = through.map(|b| b.total() * row.products(b.word)[0]).sum();
+                let through = row.escapes.filter(|b| row.depth(b.path) > 0);
+                let through: f64 = through.map(|b| b.total() * row.products(b.path)[0]).sum();
                 let s = shares(&row);
                 mirrored = mirrored.max(s.mirrored);
                 let sum = kept.sum::<f64>() + through + 1.0 - s.blocked;
                 // roundings of at most a few thousand terms; a cut chain is a loss, never a gain
                 assert!(sum <= 1.0 + 1e-12, "{name}, row {unknown}: {sum}");
-                assert!(1.0 - sum <= row.row.lost + 1e-12, "{name}, row {unknown}: {sum} {}", row.row.lost);
+                assert!(
+                    1.0 - sum <= row.row.truncated_weight + 1e-12,
+                    "{name}, row {unknown}: {sum} {}",
+                    row.row.truncated_weight
+                );
             }
             assert!(mirrored > 0.1, "{name}: mirrors bring {mirrored}");
         });
@@ -126,9 +130,9 @@ fn a_mirror_pipe_loses_no_ray() {
             assert!(row.targets.is_empty(), "nothing comes back");
             assert!(s.mirrored > 0.5, "most of the sky is seen in mirrors");
             // sums of shares of 1/n, n a power of two; a chain that grazes the floor may meet a thousand mirrors
-            let left = s.mirrored + row.row.lost - s.blocked;
+            let left = s.mirrored + row.row.truncated_weight - s.blocked;
             assert!(left.abs() < 1e-13, "row {unknown}: {} of {}", s.mirrored, s.blocked);
-            assert!(row.row.lost < 1e-2, "row {unknown}: {} lost", row.row.lost);
+            assert!(row.row.truncated_weight < 1e-2, "row {unknown}: {} lost", row.row.truncated_weight);
         }
     });
 }
@@ -152,12 +156,12 @@ fn couplings_are_reciprocal_straight_and_through_mirrors() {
             for (unknown, row) in geometry.coupling().unwrap().rows(0..elements.unknowns()) {
                 rays.push(f64::from(row.row.rays));
                 for r in row.targets {
-                    factors.insert((unknown, r.unknown(), row.products(r.word())[0].to_bits()), r.weight);
+                    factors.insert((unknown, r.unknown(), row.products(r.path())[0].to_bits()), r.weight);
                 }
             }
             let (mut square, mut stated, mut pairs) = (0.0, 0.0, 0);
-            for (&(i, j, word), &there) in &factors {
-                let back = factors.get(&(j, i, word)).copied().unwrap_or(0.0);
+            for (&(i, j, path), &there) in &factors {
+                let back = factors.get(&(j, i, path)).copied().unwrap_or(0.0);
                 let difference = area(i) * there - area(j) * back;
                 // that of independent rays
                 let of = |k: usize, f: f64| area(k) * (f * (1.0 - f) / rays[k]).max(0.0).sqrt();

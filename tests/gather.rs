@@ -6,7 +6,7 @@ mod support;
 
 use blik_kernel::arena::Memory;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
-use blik_kernel::chain::{Sample, Solved, Terms};
+use blik_kernel::chain::{RaySample, Solved, Terms};
 use blik_kernel::form_factor::point_to_polygon;
 use blik_kernel::host::Settings;
 use blik_kernel::image::{Target, rows, scratch_bytes};
@@ -39,7 +39,7 @@ fn radiance(solved: &Solved<'_>, place: Vec3) -> f64 {
     let from = solved.scene.to_scene(place + Vec3::new(0.0, 0.5, 1.0));
     let direction = (solved.scene.to_scene(place) - from).normalize();
     let mut terms = Terms::ZERO;
-    solved.radiance(&Ray::new(from, direction), Sample::Alone(1), &mut terms);
+    solved.radiance(&Ray::new(from, direction), RaySample::Integrate(1), &mut terms);
     terms.sum(0)
 }
 

@@ -9,7 +9,7 @@ mod cylinders;
 mod kernel;
 mod support;
 
-use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::chain::{RaySample, Terms};
 use blik_kernel::host::{Host, Lit, Settings};
 use blik_kernel::math::{PI, Vec3};
 use blik_kernel::ray::Ray;
@@ -103,7 +103,7 @@ fn look(lit: &Lit<'_>, origin: DVec3, index: u32) -> (f64, f64, f64) {
     let solved = lit.solved();
     let ray = Ray::new(solved.scene.to_scene(Vec3::from_array(origin.to_array())), -Vec3::Y);
     let mut terms = Terms::ZERO;
-    let path = solved.radiance(&ray, Sample::Alone(index), &mut terms);
+    let path = solved.radiance(&ray, RaySample::Integrate(index), &mut terms);
     (terms.sum(0), f64::from(path.rays), path.noise)
 }
 

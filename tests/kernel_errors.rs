@@ -9,18 +9,18 @@ use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, MAX_RESOLUTION, Projection, Sampling};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
-use blik_kernel::facing::Facing;
 use blik_kernel::form_factor::{Convex, visible_point_to_polygon};
 use blik_kernel::host::{GeometryMemory, Host, Settings};
 use blik_kernel::image::{self, Target};
-use blik_kernel::light::{self, Shape};
+use blik_kernel::light::{self, TableShape};
 use blik_kernel::lobe::Lobe;
 use blik_kernel::math::Vec3;
+use blik_kernel::plane_sides::PlaneSides;
 use blik_kernel::radiosity::straight::Straight;
 use blik_kernel::scene::{Gloss, MaterialInput, NO_NORMAL, Scene, SceneInput};
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::sky::{Sky, SkyInput, SkyModel, SkyTable};
-use blik_kernel::subdivide::Cut;
+use blik_kernel::subdivide::SubdivisionTree;
 use blik_kernel::sun::{Sun, SunInput};
 use blik_kernel::{Error, Field};
 use kernel::{geometry, solve, within};
@@ -310,13 +310,13 @@ fn memory_of_the_wrong_size() {
     let error = Bvh::build_obvhs(scene.corners(), scene.areas(), isa, &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
-    let needed = Cut::bytes(2, 1e-2).unwrap();
+    let needed = SubdivisionTree::bytes(2, 1e-2).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
-    let error = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut small).unwrap_err();
+    let error = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     let mut trees = vec![0; needed];
-    let cut = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
+    let cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
     let needed = Elements::bytes(&cut).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
     let error = Elements::new(&scene, &cut, &mut small).unwrap_err();
@@ -324,7 +324,7 @@ fn memory_of_the_wrong_size() {
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     assert!(matches!(Block::open(&[]).unwrap_err(), Error::BufferTooSmall { given: 0, .. }));
     // as many elements as an index holds, the finest cut of so many facets goes beyond
-    let error = Cut::bytes(1 << 29, 1e-6).unwrap_err();
+    let error = SubdivisionTree::bytes(1 << 29, 1e-6).unwrap_err();
     is(error, Error::TooMany { what: "elements", limit: 1 << 29 }, &["too many elements", "536870912"]);
     // more pieces of a polygon than there is room for
     let triangle = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Vec3::from_array);
@@ -392,14 +392,14 @@ fn outputs_of_the_wrong_size() {
         assert!(sums.iter().all(|s| s.area == 7.0));
 
         let mut values = [7.0; 5];
-        let mut trees = vec![0; Cut::bytes(solved.scene.facets(), 1e-3).unwrap()];
-        let mut cut = Cut::new(solved.scene, &ErrorBudget::new(1e-3, 1e-3), &mut trees).unwrap();
-        let (work, _) = cut.work();
+        let mut trees = vec![0; SubdivisionTree::bytes(solved.scene.facets(), 1e-3).unwrap()];
+        let mut cut = SubdivisionTree::new(solved.scene, &ErrorBudget::new(1e-3, 1e-3), &mut trees).unwrap();
+        let (work, _) = cut.newest_level();
         let error = work
             .probe(
                 solved.scene,
                 solved.bvh,
-                &Facing::NONE,
+                &PlaneSides::NONE,
                 (16, &ErrorBudget::new(1e-3, 1e-3)),
                 0..6,
                 &mut values,
@@ -434,7 +434,7 @@ fn stages_of_different_scenes() {
         // a sky with directions on a coupling that kept none
         let expected = Error::Mismatch { what: "coupling without directions" };
         is(host.light(few, Some(&sky), None).unwrap_err(), expected, &["without directions"]);
-        let shape = Shape { levels: 1, bands: 1 };
+        let shape = TableShape { levels: 1, bands: 1 };
         let checked = Sky::new(&sky, 1).unwrap();
         let all = 0..coupling.unknowns();
         let mut table = vec![7.0; all.len() * shape.stride()];

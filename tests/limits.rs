@@ -9,7 +9,7 @@ use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::chain::Solved;
 use blik_kernel::host::{Lit, Settings};
 use blik_kernel::image::{Target, rows, scratch_bytes};
-use blik_kernel::light::{self, Light, Shape, sky_rows};
+use blik_kernel::light::{self, Light, TableShape, sky_rows};
 use blik_kernel::math::{FRAC_1_PI, PI, Vec3};
 use blik_kernel::mirror::OFFSET;
 use blik_kernel::radiosity::solution::Solution;
@@ -78,7 +78,8 @@ fn without_mirrors_it_is_equation_3() {
         let case = Case::new(scenes::corner(2), &materials).sky(sky);
         case.with_lit(2, &within(1e-2), |host, lit| {
             let solved = lit.solved();
-            let (scene, elements, shape) = (solved.scene, solved.elements, Shape { levels: 1, bands: 1 });
+            let (scene, elements, shape) =
+                (solved.scene, solved.elements, TableShape { levels: 1, bands: 1 });
             let unknowns = elements.unknowns();
             case.with_geometry(1, &within(1e-2), |_, geometry| {
                 let coupling = geometry.coupling().unwrap();
@@ -87,7 +88,7 @@ fn without_mirrors_it_is_equation_3() {
                     let scale = solved.straight.scale(k, 1, &row.row);
                     row.targets.iter().for_each(|r| factors[k][r.unknown()] += scale * r.weight);
                     assert!(
-                        row.escapes.into_iter().all(|b| row.depth(b.word) == 0),
+                        row.escapes.into_iter().all(|b| row.depth(b.path) == 0),
                         "no path by way of a mirror"
                     );
                 }
@@ -120,7 +121,7 @@ fn without_mirrors_it_is_equation_3() {
                     };
                     let (mut gathered, mut missed) = (vec![0.0; 3 * unknowns], vec![0.0; unknowns]);
                     system.gather(0..unknowns, 0, |_| radiance, &mut gathered).unwrap();
-                    system.slopes(0..unknowns, &gathered, &mut missed);
+                    system.gradient_source(0..unknowns, &gathered, &mut missed);
                     missed
                 };
                 let missed = of(&table, &radiance);

@@ -13,18 +13,18 @@ use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
 use blik_kernel::coupling::rows::{self, RowSettings};
-use blik_kernel::coupling::{Block, Coupling, sink};
+use blik_kernel::coupling::{Block, Coupling, row_builder};
 use blik_kernel::element::Elements;
-use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Target};
-use blik_kernel::light::{self, Light, Shape};
+use blik_kernel::light::{self, Light, TableShape};
+use blik_kernel::plane_sides::PlaneSides;
 use blik_kernel::radiosity::System;
 use blik_kernel::radiosity::straight::Straight;
 use blik_kernel::scene::Scene;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{Sky, SkyModel};
-use blik_kernel::subdivide::Cut;
+use blik_kernel::subdivide::SubdivisionTree;
 use blik_kernel::sun::Sun;
 use case::{Case, SkyOf, SunOf, orthographic, within};
 use stages::{Plan, Workspace};
@@ -157,16 +157,17 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         short("tree", bytes, |memory| Bvh::build_obvhs(corners, areas, Isa::BASELINE, memory).err());
         let mut memory = vec![0; bytes];
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
-        let bytes = Facing::bytes(&scene, true).unwrap();
-        short("planes", bytes, |memory| Facing::new(&scene, &bvh, true, memory).err());
-        short("trees", Cut::bytes(facets, 1e-2).unwrap(), |memory| {
-            Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), memory).err()
+        let bytes = PlaneSides::bytes(&scene, true).unwrap();
+        short("planes", bytes, |memory| PlaneSides::new(&scene, &bvh, true, memory).err());
+        short("trees", SubdivisionTree::bytes(facets, 1e-2).unwrap(), |memory| {
+            SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), memory).err()
         });
-        let mut trees = vec![0; Cut::bytes(facets, 1e-2).unwrap()];
-        let mut cut = Cut::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
-        let (work, _) = cut.work();
+        let mut trees = vec![0; SubdivisionTree::bytes(facets, 1e-2).unwrap()];
+        let mut cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
+        let (work, _) = cut.newest_level();
         wrong("unevenness", facets, f64::MAX, |out| {
-            work.probe(&scene, &bvh, &Facing::NONE, (16, &ErrorBudget::new(1e-2, 1e-2)), 0..facets, out).err()
+            work.probe(&scene, &bvh, &PlaneSides::NONE, (16, &ErrorBudget::new(1e-2, 1e-2)), 0..facets, out)
+                .err()
         });
         let bytes = Elements::bytes(&cut).unwrap();
         short("elements", bytes, |memory| Elements::new(&scene, &cut, memory).err());
@@ -181,7 +182,7 @@ fn with_stages(check: impl FnOnce(&System<'_>, &Bvh<'_>, &RowSettings)) {
             (geometry.scene(), geometry.elements(), geometry.coupling().unwrap());
         let (sky, sun) = (case.sky.as_ref().unwrap().input(), case.sun.as_ref().unwrap().input());
         let light = Light { sky: Some(Sky::new(&sky, 3).unwrap()), sun: Some(Sun::new(&sun, 3).unwrap()) };
-        let shape = Shape { levels: 1, bands: 3 };
+        let shape = TableShape { levels: 1, bands: 3 };
         let direct = vec![0.5; elements.unknowns() * shape.stride()];
         let lit = vec![0.5; elements.unknowns()];
         let (light, direct, sun) = (&light, &direct[..], &lit[..]);
@@ -201,7 +202,7 @@ fn coupling_and_beams_refuse_memory_that_holds_no_row() {
         let (scene, elements, n) = (system.scene, system.elements, system.elements.unknowns());
         let beams = BeamSettings::new(scene, system.light.sun.as_ref().unwrap(), 1000.0, 1e-3, 10);
         let mut fills: [Box<Fill<'_>>; 2] = [
-            Box::new(|memory| rows::fill(scene, bvh, elements, &Facing::NONE, settings, 0..n, memory)),
+            Box::new(|memory| rows::fill(scene, bvh, elements, &PlaneSides::NONE, settings, 0..n, memory)),
             Box::new(|memory| {
                 let (sun, facets) = (system.light.sun.as_ref().unwrap(), scene.facets());
                 beam::fill(scene, bvh, elements, sun, &beams, 0..facets, memory)
@@ -219,7 +220,7 @@ fn coupling_and_beams_refuse_memory_that_holds_no_row() {
             }
         }
         // memory for some rows takes those, and says how many; the rest goes to the next block
-        let mut memory = vec![0xa5; sink::bytes(n, 16, 4 * settings.rays as usize, 3).unwrap()];
+        let mut memory = vec![0xa5; row_builder::bytes(n, 16, 4 * settings.rays as usize, 3).unwrap()];
         let done = fills[0](&mut memory).unwrap();
         assert!(done > 0 && done < n, "{done} of {n} rows");
         let block = Block::open(&memory).unwrap();

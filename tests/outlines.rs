@@ -46,7 +46,7 @@ fn by_rays(bvh: &Bvh<'_>, surface: &Surface, up: Vec3) -> [f64; 4] {
     for index in 0..RAYS {
         let (u, v) = sequence.pair(index, 0);
         let (a, b, c) = cosine_direction(u, v);
-        rays.push(surface.leave(x * a + y * b + surface.normal * c));
+        rays.push(surface.spawn_ray(x * a + y * b + surface.normal * c));
     }
     let mut hidden = vec![false; rays.len()];
     bvh.occluded_many(&rays, &mut hidden);

@@ -380,7 +380,7 @@ fn only_what_shows_of_a_floor_counts() {
     let case = Case::new(mesh, &[Material::new(1.0, 0.0), Material::new(0.0, 0.0)]).sky(SkyOf::uniform(1));
     let shown = case.with_geometry(0, &within(3e-2), |_, geometry| {
         let (elements, coupling) = (geometry.elements(), geometry.coupling().unwrap());
-        let of = |u: usize| elements.share(u) * f64::from(coupling.row(u).exposed);
+        let of = |u: usize| elements.share(u) * f64::from(coupling.row(u).visible_share);
         (0..2).flat_map(|facet| elements.unknowns_of(facet, 0)).map(of).sum::<f64>() / 2.0
     });
     let truth = 1.0 - 0.6 * 0.49 / 4.0;

@@ -10,9 +10,9 @@ use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::coupling::rows::RowSettings;
 use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN};
 use blik_kernel::element::Elements;
-use blik_kernel::facing::Facing;
+use blik_kernel::plane_sides::PlaneSides;
 use blik_kernel::stages::{self, BlockPlace, CouplingRows};
-use blik_kernel::subdivide::{self, Cut};
+use blik_kernel::subdivide::{self, SubdivisionTree};
 use blik_kernel::{Error, settings};
 use core::ffi::c_void;
 
@@ -189,37 +189,37 @@ fn element_bytes(base: &blik_scene, tolerance: f64) -> Result<usize, blik_error>
     // first element of each facet, all nodes, facet and path of each element; the trees while they grow
     let kept =
         facets.saturating_mul(4).saturating_add(most.saturating_mul(4 + 4 + 6)).saturating_add(8 * ALIGNMENT);
-    Ok(Cut::bytes(facets, tolerance)?.saturating_add(kept))
+    Ok(SubdivisionTree::bytes(facets, tolerance)?.saturating_add(kept))
 }
 
 /// How finely each facet is cut.
 fn cut<'s>(
     base: &blik_scene,
-    facing: &Facing<'_>,
+    plane_sides: &PlaneSides<'_>,
     settings: &Settings,
     runner: &mut Runner,
     scratch: &'s mut [u8],
-) -> Result<Cut<'s>, blik_error> {
-    let mut cut = Cut::new(&base.scene, &settings.asked.budget, scratch)?;
-    stages::refine(&base.scene, &base.bvh, facing, &settings.asked, &mut cut, runner)?;
+) -> Result<SubdivisionTree<'s>, blik_error> {
+    let mut cut = SubdivisionTree::new(&base.scene, &settings.asked.budget, scratch)?;
+    stages::refine(&base.scene, &base.bvh, plane_sides, &settings.asked, &mut cut, runner)?;
     Ok(cut)
 }
 
 /// Makes the elements in the caller's memory.
 fn elements(
     base: &blik_scene,
-    facing: &Facing<'_>,
+    plane_sides: &PlaneSides<'_>,
     settings: &Settings,
     runner: &mut Runner,
     cutter: &mut Cutter,
 ) -> Result<Elements<'static>, blik_error> {
     // the trees stand at the end of the memory while the elements are made at its front
-    let scratch_bytes = Cut::bytes(base.scene.facets(), settings.asked.budget.solution)?;
+    let scratch_bytes = SubdivisionTree::bytes(base.scene.facets(), settings.asked.budget.solution)?;
     let whole = cutter.lend();
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
     let (_, scratch) = whole.split_at_mut_checked(keep).ok_or(short)?;
-    let cut = cut(base, facing, settings, runner, scratch)?;
+    let cut = cut(base, plane_sides, settings, runner, scratch)?;
     let bytes = Elements::bytes(&cut)?.next_multiple_of(ALIGNMENT);
     if bytes > keep {
         return Err(short.sizes(bytes + scratch_bytes, cutter.size));
@@ -238,7 +238,7 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
         subdivide::most_elements(base.scene.facets(), settings.asked.budget.solution) * base.scene.sides();
     let row = stages::least_bytes(&base.scene, &rows, unknowns)?;
     let table = stages::places(unknowns) * (size_of::<BlockPlace>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
-    let planes = Facing::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
+    let planes = PlaneSides::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
     let parts =
         [head::<blik_coupling>(), element_bytes(base, settings.asked.budget.solution)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
@@ -271,12 +271,12 @@ fn build(
     }
     let (place, rest) = place::<blik_coupling>(memory)?;
     let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) };
-    let planes = cutter.take_back(Facing::bytes(&base.scene, settings.planes(base))?)?;
-    let facing = Facing::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
-    let elements = elements(base, &facing, settings, runner, &mut cutter)?;
+    let planes = cutter.take_back(PlaneSides::bytes(&base.scene, settings.planes(base))?)?;
+    let plane_sides = PlaneSides::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
+    let elements = elements(base, &plane_sides, settings, runner, &mut cutter)?;
     let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
     let (bvh, scene) = (&base.bvh, &base.scene);
-    let rows = CouplingRows { scene, bvh, elements: &elements, facing: &facing, rows };
+    let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows };
     let places = table(&mut cutter, rows.places(), BlockPlace::default())?;
     let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
     let size = cutter.size.saturating_sub(room);
@@ -445,7 +445,7 @@ impl blik_coupling {
         };
         for (_, row) in matrix.rows(0..matrix.unknowns()) {
             info.pairs += row.targets.len() as u64;
-            info.dropped = info.dropped.max(row.row.lost);
+            info.dropped = info.dropped.max(row.row.truncated_weight);
             info.skipped_rows += u64::from(row.row.state == ABSENT);
             info.open_rows += u64::from(row.row.state == OPEN);
         }
@@ -467,19 +467,20 @@ mod owned {
         settings: &Settings,
         runner: &mut Runner,
     ) -> Result<*mut blik_coupling, blik_error> {
-        let mut planes = Slab::new(Facing::bytes(&base.scene, settings.planes(base))?)?;
+        let mut planes = Slab::new(PlaneSides::bytes(&base.scene, settings.planes(base))?)?;
         // SAFETY: dropped at the end of this function, after the last use.
-        let facing =
-            Facing::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
-        let mut scratch = Slab::new(Cut::bytes(base.scene.facets(), settings.asked.budget.solution)?)?;
+        let plane_sides =
+            PlaneSides::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
+        let mut scratch =
+            Slab::new(SubdivisionTree::bytes(base.scene.facets(), settings.asked.budget.solution)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
-        let cut = cut(base, &facing, settings, runner, unsafe { scratch.bytes_mut() })?;
+        let cut = cut(base, &plane_sides, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(&cut)?)?;
         // SAFETY: the handle owns the slab.
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
         let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
         let (bvh, scene) = (&base.bvh, &base.scene);
-        let rows = CouplingRows { scene, bvh, elements: &elements, facing: &facing, rows };
+        let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows };
         let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
         rows.fill(&mut pieces, runner)?;
         let mut slabs: Vec<Slab> = pieces.into_iter().flat_map(|piece| piece.blocks).collect();

@@ -213,7 +213,11 @@ pub unsafe extern "C" fn blik_rounds_next(
         policy::check_tolerance(rounds.asked)?;
         if report.is_null() {
             let asked = rounds.asked;
-            to.write(blik_rounds { asked, tolerance: policy::first(asked), ..blik_rounds::default() });
+            to.write(blik_rounds {
+                asked,
+                tolerance: policy::first_tolerance(asked),
+                ..blik_rounds::default()
+            });
             return Ok(());
         }
         // SAFETY: by the caller's promise.
@@ -234,7 +238,7 @@ pub unsafe extern "C" fn blik_rounds_next(
         };
         let before = (rounds.done > 0).then_some(&before);
         rounds.done = rounds.done.saturating_add(1);
-        rounds.tolerance = policy::again(rounds.asked, &last, before, rounds.done).unwrap_or(0.0);
+        rounds.tolerance = policy::next_tolerance(rounds.asked, &last, before, rounds.done).unwrap_or(0.0);
         rounds.last_by_visibility = i32::from(last.by_visibility);
         (rounds.last_tolerance, rounds.last_estimate) = (last.tolerance, last.estimate);
         (rounds.last_rays, rounds.last_bytes) = (last.rays, last.bytes);

@@ -10,7 +10,7 @@ use crate::types::*;
 use blik_kernel::Error;
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
-use blik_kernel::chain::{Sample, Terms, Work};
+use blik_kernel::chain::{ChainScratch, RaySample, Terms};
 use blik_kernel::image::{self, Tally, Target, piece};
 use blik_kernel::math::Vec3;
 use blik_kernel::scene::{MAX_BANDS, Scene};
@@ -380,7 +380,7 @@ pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usi
 
 /// Bytes of one lane's scratch memory while rays are followed, or a signature is found, and the sky behind it.
 fn lane_bytes() -> Result<usize, blik_error> {
-    let rays = Need::new().and::<Terms>(1).and::<Work>(1).bytes()?;
+    let rays = Need::new().and::<Terms>(1).and::<ChainScratch>(1).bytes()?;
     let signature = signature::scratch_bytes()? + Need::new().and::<f64>(MAX_BANDS).bytes()?;
     Ok(rays.max(signature).next_multiple_of(ALIGNMENT))
 }
@@ -471,7 +471,7 @@ pub unsafe extern "C" fn blik_radiance(
             follow(count.div_ceil(RADIANCE_PIECE_RAYS), given, &mut runner, |item, memory| {
                 let short = Error::BufferTooSmall { needed: lane_bytes()?, given: memory.len() };
                 let mut arena = Arena::new(memory, 0)?;
-                let (terms, work) = (arena.take::<Terms>(1)?, arena.take::<Work>(1)?);
+                let (terms, work) = (arena.take::<Terms>(1)?, arena.take::<ChainScratch>(1)?);
                 let (terms, work) = (terms.first_mut().ok_or(short)?, work.first_mut().ok_or(short)?);
                 let first = item * RADIANCE_PIECE_RAYS;
                 let own = rays.iter().skip(first).take(RADIANCE_PIECE_RAYS);
@@ -482,7 +482,7 @@ pub unsafe extern "C" fn blik_radiance(
                     let ray = inside(scene, ray);
                     terms.clear(bands);
                     let hit = solution.coupling.base.bvh.closest(&ray);
-                    solved.radiance_at((&ray, hit), Sample::Alone(index as u32), terms, work);
+                    solved.radiance_at((&ray, hit), RaySample::Integrate(index as u32), terms, work);
                     out.iter_mut().enumerate().for_each(|(band, l)| *l = terms.sum(band));
                 }
                 Ok(())

@@ -15,7 +15,7 @@ use crate::base::index::Index;
 use crate::base::simd::Isa;
 use crate::coupling::Block;
 use crate::coupling::element::Elements;
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 use crate::radiosity::solution::{self, Numbers};
 use crate::radiosity::straight::{self, BY_ROWS, Straight};
 use crate::radiosity::sun_image::{self, SunImages};
@@ -276,10 +276,10 @@ impl<'m> Solution<'m> {
         writer.put(sun)?;
         writer.put(variance)?;
         writer.put(images.slots)?;
-        writer.put(images.thrown)
+        writer.put(images.reflected_irradiance)
     }
 
-    fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: Shape) -> Result<Solution<'m>, Error> {
+    fn get(view: &mut View<'m>, elements: &Elements<'_>, shape: TableShape) -> Result<Solution<'m>, Error> {
         let (bands, unknowns) = (shape.bands, elements.unknowns());
         let head = view.take::<LightHead>(1)?.first().copied().ok_or(Error::Block)?;
         let (radiance, ground) = (view.take::<f64>(bands)?, view.take::<f64>(bands)?);
@@ -308,8 +308,8 @@ impl<'m> Solution<'m> {
         if head.images != 0 {
             let sides = elements.facet_sides();
             let slots = view.take::<u64>(sun_image::places(sides))?;
-            let thrown = view.take::<f64>(unknowns * shape.levels * bands)?;
-            images = SunImages::new(slots, thrown, sides, unknowns, shape)?;
+            let reflected_irradiance = view.take::<f64>(unknowns * shape.levels * bands)?;
+            images = SunImages::new(slots, reflected_irradiance, sides, unknowns, shape)?;
         }
         let record = solution::Solution {
             shape,
@@ -335,7 +335,7 @@ impl<'m> Solution<'m> {
             && record.straight.values.iter().all(|x| x.abs() <= 1e40)
             && record.straight.variance.iter().all(|x| *x == BY_ROWS || (0.0..=f32::MAX).contains(x))
             && record.sun.iter().all(|x| (0.0..=1.0 + 1e-9).contains(x))
-            && record.images.thrown.iter().all(|x| (0.0..=1e40).contains(x))
+            && record.images.reflected_irradiance.iter().all(|x| (0.0..=1e40).contains(x))
             && record.variance.iter().all(|x| (0.0..=f32::MAX).contains(x))
             && record.reference.iter().all(|x| (0.0..=1e38).contains(x))
             && positive(&record.numbers.brightest)

@@ -9,12 +9,12 @@ pub mod bundle;
 pub(crate) mod detail;
 pub mod element;
 mod exact;
-pub mod facing;
+pub mod mirror_path;
 pub mod pack;
+pub mod plane_sides;
+pub mod row_builder;
 pub mod rows;
-pub mod sink;
 pub mod subdivide;
-pub mod word;
 
 use crate::base::arena::{View, plain_struct};
 use crate::base::error::Error;
@@ -25,13 +25,13 @@ use crate::base::simd::{self, Isa, Task};
 use crate::coupling::element::Local;
 use bundle::Bundles;
 use core::ops::Range;
-use word::Word;
+use mirror_path::MirrorPath;
 
 plain_struct! {
     /// One term of a row, escapes only while it grows: then they are put in [`bundle`]s. The gradient is how the weight
     /// varies over the element, in local coordinates.
     pub struct Record {
-        /// Bit 63: an escape; bits 16..: target unknown (32 bits) or direction; bits 0..16: word.
+        /// Bit 63: an escape; bits 16..: target unknown (32 bits) or direction; bits 0..16: number of the [`MirrorPath`].
         pub key: u64,
         /// Share of the cosine hemisphere, mean over the element.
         pub weight: f64,
@@ -39,7 +39,7 @@ plain_struct! {
         pub gradient: [f32; 2],
         /// What tells the weight's error: half the difference between two halves of the rays, of two quarters of the
         /// element and of the others; the middle quarter's weight beside its neighbours', by either half.
-        pub checks: [f32; 4],
+        pub half_differences: [f32; 4],
         /// The weight times where on the target its rays arrive, in local coordinates.
         pub moment: [f32; 2],
     }
@@ -60,9 +60,9 @@ plain_struct! {
         pub chain_rays: u32,
         /// Share of the element that is not inside a body, where nothing sees it; the row is that part's mean, or the
         /// whole element's where that share is 0.
-        pub exposed: f32,
+        pub visible_share: f32,
         /// Weight of chains cut before their end, times the largest product of their mirrors.
-        pub lost: f64,
+        pub truncated_weight: f64,
         /// Share of the hemisphere in which straight rays meet facets.
         pub blocked: f64,
     }
@@ -93,9 +93,9 @@ plain_struct! {
         pub rows: u64,
         /// Records.
         pub records: u64,
-        /// Words.
-        pub words: u64,
-        /// Word capacity.
+        /// Mirror paths.
+        pub paths: u64,
+        /// Room for mirror paths.
         pub capacity: u64,
         /// Spectral bands.
         pub bands: u64,
@@ -108,34 +108,34 @@ plain_struct! {
 
 const ESCAPE: u64 = 1 << 63;
 
-/// The word of an escape that stands for light which does not arrive: its first ray met a facet.
+/// The path of an escape that stands for light which does not arrive: its first ray met a facet.
 pub const BLOCKED: u16 = u16::MAX;
 
 impl Record {
-    /// A target seen along a word, at a point of it.
+    /// A target seen along a path, at a point of it.
     #[inline(always)]
-    pub fn target((unknown, (a, b)): (usize, Local), word: u16, weight: f64, gradient: [f32; 2]) -> Record {
-        let key = (unknown as u64) << 16 | u64::from(word);
+    pub fn target((unknown, (a, b)): (usize, Local), path: u16, weight: f64, gradient: [f32; 2]) -> Record {
+        let key = (unknown as u64) << 16 | u64::from(path);
         let moment = [(weight * a) as f32, (weight * b) as f32];
-        Record { key, weight, gradient, checks: [0.0; 4], moment }
+        Record { key, weight, gradient, half_differences: [0.0; 4], moment }
     }
 
-    /// The sky seen along a word in `direction` (kept to 6.6e-5 rad), or in any direction.
+    /// The sky seen along a path in `direction` (kept to 6.6e-5 rad), or in any direction.
     #[inline(always)]
-    pub fn escape(direction: Option<Vec3>, word: u16, weight: f64, gradient: [f32; 2]) -> Record {
+    pub fn escape(direction: Option<Vec3>, path: u16, weight: f64, gradient: [f32; 2]) -> Record {
         let packed = direction.map_or(0, octahedron::pack::<SKY_BITS>);
         Record {
-            key: ESCAPE | packed << 16 | u64::from(word),
+            key: ESCAPE | packed << 16 | u64::from(path),
             weight,
             gradient,
-            checks: [0.0; 4],
+            half_differences: [0.0; 4],
             moment: [0.0; 2],
         }
     }
 
-    /// The word.
+    /// Number of its path.
     #[inline(always)]
-    pub fn word(&self) -> u16 {
+    pub fn path(&self) -> u16 {
         self.key as u16
     }
 
@@ -155,7 +155,7 @@ impl Record {
     /// mirrors) by way of a last `mirror`, a facet.
     pub fn beam(
         (unknown, (a, b)): (usize, Local),
-        word: u16,
+        path: u16,
         weight: f64,
         (image, mirror): (u64, u32),
     ) -> Record {
@@ -163,11 +163,17 @@ impl Record {
         let apart = image.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 50;
         // 24 bits of each are exact: 16 of the image above 8 of the mirror
         let part = |k: u32| (image >> (16 * k) & 0xffff) << 8 | u64::from(mirror >> (8 * k) & 0xff);
-        let checks = [3, 2, 1, 0].map(|k| part(k) as f32);
-        let key = (unknown as u64 | apart << 32) << 16 | u64::from(word);
+        let half_differences = [3, 2, 1, 0].map(|k| part(k) as f32);
+        let key = (unknown as u64 | apart << 32) << 16 | u64::from(path);
         // where on the element it falls: weighted sums of the place, of its squared distance from the middle, and a count
         let gradient = [weight * a, weight * b].map(|x| x as f32);
-        Record { key, weight, gradient, checks, moment: [(weight * (a * a + a * b + b * b)) as f32, 1.0] }
+        Record {
+            key,
+            weight,
+            gradient,
+            half_differences,
+            moment: [(weight * (a * a + a * b + b * b)) as f32, 1.0],
+        }
     }
 
     /// The same with `share` of the weight.
@@ -186,12 +192,12 @@ impl Record {
 
     /// The image of a beam.
     pub fn image(&self) -> u64 {
-        self.checks.iter().fold(0, |image, part| image << 16 | *part as u64 >> 8)
+        self.half_differences.iter().fold(0, |image, part| image << 16 | *part as u64 >> 8)
     }
 
     /// The last mirror of a beam, a facet.
     pub fn mirror(&self) -> usize {
-        self.checks.iter().fold(0, |mirror, part| mirror << 8 | *part as usize & 0xff)
+        self.half_differences.iter().fold(0, |mirror, part| mirror << 8 | *part as usize & 0xff)
     }
 
     /// Adds up what two rays of a row found.
@@ -205,13 +211,13 @@ impl Record {
         self.gradient[1] += record.gradient[1];
         self.moment[0] += record.moment[0];
         self.moment[1] += record.moment[1];
-        self.checks.iter_mut().zip(record.checks).for_each(|(to, from)| *to += from);
+        self.half_differences.iter_mut().zip(record.half_differences).for_each(|(to, from)| *to += from);
         true
     }
 
     /// Adds up what two rays of a beam brought.
     pub fn join_beam(&mut self, record: &Record) -> bool {
-        let same = self.key == record.key && self.checks == record.checks;
+        let same = self.key == record.key && self.half_differences == record.half_differences;
         if same {
             self.weight += record.weight;
             self.gradient.iter_mut().zip(record.gradient).for_each(|(to, from)| *to += from);
@@ -232,7 +238,7 @@ impl Record {
 pub struct Block<'m> {
     head: Head,
     rows: &'m [Row],
-    words: &'m [Word],
+    paths: &'m [MirrorPath],
     products: &'m [f64],
     records: &'m [Record],
 }
@@ -244,14 +250,14 @@ impl<'m> Block<'m> {
             first: 0,
             rows: 0,
             records: 0,
-            words: 0,
+            paths: 0,
             capacity: 0,
             bands: 0,
             room: 0,
             directional: 0,
         },
         rows: &[],
-        words: &[],
+        paths: &[],
         products: &[],
         records: &[],
     };
@@ -261,11 +267,11 @@ impl<'m> Block<'m> {
         let mut view = View::new(memory);
         let head = view.take::<Head>(1)?.at(0);
         let rows = view.take::<Row>(head.room as usize + 1)?;
-        let words = view.take::<Word>(head.capacity as usize)?;
+        let paths = view.take::<MirrorPath>(head.capacity as usize)?;
         let products = view.take::<f64>((head.capacity * head.bands) as usize)?;
         let records = view.take::<Record>(head.records as usize)?;
         let rows = rows.part(0..head.rows as usize + 1);
-        Ok(Block { head, rows, words: words.part(0..head.words as usize), products, records })
+        Ok(Block { head, rows, paths: paths.part(0..head.paths as usize), products, records })
     }
 
     /// The unknowns whose rows it holds.
@@ -289,8 +295,8 @@ impl<'m> Block<'m> {
     pub fn memory(&self) -> usize {
         size_of::<Head>()
             + size_of_val(self.rows)
-            + size_of_val(self.words)
-            + self.words.len() * self.head.bands as usize * 8
+            + size_of_val(self.paths)
+            + self.paths.len() * self.head.bands as usize * 8
             + size_of_val(self.records)
     }
 }
@@ -305,16 +311,16 @@ pub struct RowView<'m> {
     /// Terms that end in the sky by way of mirrors, and the blocked or (where the row is [`ENCLOSED`]) the open part
     /// of the hemisphere.
     pub escapes: Bundles<'m>,
-    words: &'m [Word],
+    paths: &'m [MirrorPath],
     products: &'m [f64],
     bands: usize,
 }
 
 impl<'m> RowView<'m> {
-    /// Products of the mirror reflectances of a word, one per band; nothing of [`BLOCKED`].
+    /// Products of the mirror reflectances of a path, one per band; nothing of [`BLOCKED`].
     #[inline(always)]
-    pub fn products(&self, word: u16) -> &'m [f64] {
-        let at = word as usize * self.bands;
+    pub fn products(&self, path: u16) -> &'m [f64] {
+        let at = path as usize * self.bands;
         self.products.get(at..at + self.bands).unwrap_or(&[])
     }
 
@@ -325,7 +331,7 @@ impl<'m> RowView<'m> {
         if let [sum] = sums {
             *sum = 0.0;
             for record in self.targets {
-                let product = self.products.at(record.word() as usize);
+                let product = self.products.at(record.path() as usize);
                 *sum += record.weight * product * values.at(record.unknown()).into();
             }
             return;
@@ -337,15 +343,15 @@ impl<'m> RowView<'m> {
     pub fn sums(&self, sums: &mut [f64]) {
         sums.fill(0.0);
         for record in self.targets {
-            let products = self.products(record.word());
+            let products = self.products(record.path());
             sums.iter_mut().zip(products).for_each(|(s, p)| *s += record.weight * p);
         }
     }
 
-    /// Mirrors that the paths of a word met.
+    /// Mirrors on a path.
     #[inline(always)]
-    pub fn depth(&self, word: u16) -> u32 {
-        self.words.get(word as usize).map_or(0, |w| w.depth)
+    pub fn depth(&self, path: u16) -> u32 {
+        self.paths.get(path as usize).map_or(0, |w| w.depth)
     }
 }
 
@@ -367,7 +373,7 @@ impl<T: Copy + Default + Into<f64>> Task for Gather<'_, T> {
         for (block, sums) in blocks.iter_mut().enumerate() {
             let mut own = [0.0; BLOCK];
             for record in targets {
-                let products = self.row.products(record.word()).get(block * BLOCK..);
+                let products = self.row.products(record.path()).get(block * BLOCK..);
                 let values = self.values.get(record.unknown() * bands + block * BLOCK..);
                 let Some((products, values)) = products.zip(values) else { continue };
                 let first = (products.first_chunk::<BLOCK>(), values.first_chunk::<BLOCK>());
@@ -382,7 +388,7 @@ impl<T: Copy + Default + Into<f64>> Task for Gather<'_, T> {
         rest.fill(0.0);
         for record in targets.iter().filter(|_| whole < bands) {
             let values = self.values.part(record.unknown() * bands + whole..(record.unknown() + 1) * bands);
-            let terms = self.row.products(record.word()).iter().skip(whole).zip(values);
+            let terms = self.row.products(record.path()).iter().skip(whole).zip(values);
             rest.iter_mut().zip(terms).for_each(|(s, (p, x))| *s += record.weight * p * (*x).into());
         }
     }
@@ -492,7 +498,7 @@ fn row_of<'m>(block: &Block<'m>, unknown: usize) -> RowView<'m> {
         row,
         targets: block.records.part(row.start as usize..row.escapes as usize),
         escapes: Bundles::new(block.records.part(row.escapes as usize..next.start as usize)),
-        words: block.words,
+        paths: block.paths,
         products: block.products,
         bands: block.head.bands as usize,
     }

@@ -17,10 +17,10 @@ use crate::base::error::Error;
 use crate::base::math::Vec3;
 use crate::base::simd::Isa;
 use crate::coupling::element::Elements;
-use crate::coupling::facing::Facing;
-use crate::coupling::subdivide::Cut;
+use crate::coupling::plane_sides::PlaneSides;
+use crate::coupling::subdivide::SubdivisionTree;
 use crate::coupling::{Block, Coupling};
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize};
 use crate::radiosity::straight::Straight;
 use crate::radiosity::sun_image::SunImages;
@@ -137,7 +137,7 @@ pub struct Geometry<'s> {
 pub struct Lit<'g> {
     geometry: &'g Geometry<'g>,
     light: Light<'g>,
-    shape: Shape,
+    shape: TableShape,
     tables: Tables,
     numbers: Numbers,
     report: Report,
@@ -152,7 +152,7 @@ struct Tables {
     straight_variance: Vec<f32>,
     sun: Vec<f64>,
     slots: Vec<u64>,
-    thrown: Vec<f64>,
+    reflected_irradiance: Vec<f64>,
     variance: Vec<f32>,
 }
 
@@ -165,7 +165,7 @@ impl Tables {
             straight_variance: std::vec![0.0; size.straight().1],
             sun: std::vec![0.0; size.unknowns],
             slots: std::vec![0; size.places],
-            thrown: std::vec![0.0; size.thrown()],
+            reflected_irradiance: std::vec![0.0; size.reflected_irradiance()],
             variance: std::vec![0.0; size.unknowns],
         }
     }
@@ -178,7 +178,7 @@ impl Tables {
             straight_variance: &mut self.straight_variance,
             sun: &mut self.sun,
             slots: &mut self.slots,
-            thrown: &mut self.thrown,
+            reflected_irradiance: &mut self.reflected_irradiance,
             variance: &mut self.variance,
         }
     }
@@ -247,17 +247,18 @@ impl Host {
         report.seconds.bvh = clock.lap();
         let rows = settings.rows(&scene);
         let wanted = settings::planes(&scene, &rows);
-        let mut planes = Memory::new(Facing::bytes(&scene, wanted)?);
-        let facing = Facing::new(&scene, &bvh, wanted, planes.bytes_mut())?;
-        let mut trees = Memory::new(Cut::bytes(scene.facets(), settings.budget.solution)?);
-        let mut cut = Cut::new(&scene, &settings.budget, trees.bytes_mut())?;
+        let mut planes = Memory::new(PlaneSides::bytes(&scene, wanted)?);
+        let plane_sides = PlaneSides::new(&scene, &bvh, wanted, planes.bytes_mut())?;
+        let mut trees = Memory::new(SubdivisionTree::bytes(scene.facets(), settings.budget.solution)?);
+        let mut cut = SubdivisionTree::new(&scene, &settings.budget, trees.bytes_mut())?;
         let mut run = Run::new(self);
-        report.rays.visibility += stages::refine(&scene, &bvh, &facing, &settings, &mut cut, &mut run)?;
+        report.rays.visibility += stages::refine(&scene, &bvh, &plane_sides, &settings, &mut cut, &mut run)?;
         *element_memory = Memory::new(Elements::bytes(&cut)?);
         let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
         let rows = settings.rows_within(&scene, elements.unknowns());
-        let rows = CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, facing: &facing, rows };
+        let rows =
+            CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides: &plane_sides, rows };
         let blocks = match memory_budget {
             None => {
                 let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
@@ -333,7 +334,7 @@ impl Host {
         sun_rays += beams.rays;
         report.rays.sun += sun_rays;
         report.count_light(&light, size.unknowns);
-        report.bytes.light = 8 * (size.table() + size.unknowns + size.places + size.thrown());
+        report.bytes.light = 8 * (size.table() + size.unknowns + size.places + size.reflected_irradiance());
         report.seconds.light = clock.lap();
         let numbers = lighting.solve(memory, &mut scratch, sun_rays, &mut run)?.numbers;
         report.sweeps = numbers.sweeps as u32;
@@ -496,15 +497,23 @@ impl Lit<'_> {
 
     /// The record of the solution.
     pub fn solution(&self) -> Solution<'_> {
-        let Tables { reference, irradiance, straight, straight_variance, sun, slots, thrown, variance } =
-            &self.tables;
+        let Tables {
+            reference,
+            irradiance,
+            straight,
+            straight_variance,
+            sun,
+            slots,
+            reflected_irradiance,
+            variance,
+        } = &self.tables;
         Solution {
             shape: self.shape,
             reference,
             irradiance,
             straight: Straight { values: straight, variance: straight_variance },
             sun,
-            images: SunImages { slots, thrown },
+            images: SunImages { slots, reflected_irradiance },
             variance,
             numbers: self.numbers,
         }

@@ -78,7 +78,7 @@ pub mod view;
 
 pub use base::error::{Error, Field};
 pub use base::{arena, error, math, qmc, quadrature, quarter, simd};
-pub use coupling::{element, facing, subdivide};
+pub use coupling::{element, plane_sides, subdivide};
 pub use radiosity::{accuracy, beam, solver, sun_image};
 pub use rays::surface as mirror;
 pub use rays::{bvh, ray};

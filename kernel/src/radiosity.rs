@@ -18,7 +18,7 @@ use crate::base::index::{Index, IndexMut, copy, pieces, span};
 use crate::base::math::{FRAC_1_PI, PI, fabs, sqrt};
 use crate::coupling::element::Elements;
 use crate::coupling::{Coupling, RowView, TRACED};
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 use crate::radiosity::straight::Straight;
 use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
@@ -35,14 +35,14 @@ pub struct System<'a> {
     pub coupling: &'a Coupling<'a>,
     /// The light.
     pub light: &'a Light<'a>,
-    /// Irradiance by sky and beams, [`Shape::stride`] values an unknown.
+    /// Irradiance by sky and beams, [`TableShape::stride`] values an unknown.
     pub direct: &'a [f64],
     /// Mean of cos V of the sun, one value an unknown.
     pub sun: &'a [f64],
     /// The part of `direct` that outlines tell.
     pub straight: Straight<'a>,
     /// Shape of `direct`.
-    pub shape: Shape,
+    pub shape: TableShape,
 }
 
 impl System<'_> {
@@ -116,7 +116,7 @@ impl System<'_> {
 
     /// What the rows of `range` absorb or let out of a radiance of 1 from everywhere, for
     /// [`crate::radiosity::solver::History`].
-    pub fn deficits(&self, range: Range<usize>, out: &mut [f64]) {
+    pub fn row_deficits(&self, range: Range<usize>, out: &mut [f64]) {
         let bands = self.shape.bands;
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
             row.sums(out);
@@ -196,7 +196,7 @@ impl System<'_> {
             {
                 let seen = radiance(0);
                 for record in row.targets {
-                    let product = row.products(record.word()).at(0);
+                    let product = row.products(record.path()).at(0);
                     let l = scale * product * seen.at(record.unknown());
                     *mean += l * record.weight;
                     *first += l * f64::from(record.gradient[0]);
@@ -230,7 +230,7 @@ impl System<'_> {
     ) {
         let bands = self.shape.bands;
         for record in row.targets {
-            let depth = row.depth(record.word());
+            let depth = row.depth(record.path());
             if !self.shape.counts(depth, level) {
                 continue;
             }
@@ -239,7 +239,7 @@ impl System<'_> {
             let seen = radiance(from).part(start..start.wrapping_add(bands));
             let g = record.gradient.map(f64::from);
             let sums = mean.iter_mut().zip(first.iter_mut().zip(second.iter_mut())).zip(&mut *square);
-            let terms = row.products(record.word()).iter().zip(seen);
+            let terms = row.products(record.path()).iter().zip(seen);
             for (((mean, (first, second)), square), (product, seen)) in sums.zip(terms) {
                 let l = scale * product * seen;
                 *mean += l * record.weight;
@@ -252,7 +252,7 @@ impl System<'_> {
 
     /// What the rows of `range` miss where they take an element's radiance for the same all over it: irradiance by the
     /// slopes of what all unknowns send, written to `out`, one value per band. `irradiance` is the gathered table.
-    pub fn slopes(&self, range: Range<usize>, irradiance: &[f64], out: &mut [f64]) {
+    pub fn gradient_source(&self, range: Range<usize>, irradiance: &[f64], out: &mut [f64]) {
         let bands = self.shape.bands;
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(out, bands)) {
             out.fill(0.0);
@@ -261,7 +261,7 @@ impl System<'_> {
                 let seen = irradiance.part(self.shape.at(record.unknown(), 0));
                 let diffuse = self.scene.diffuse(self.material(record.unknown()));
                 let (first, second) = (seen.part(bands..2 * bands), seen.part(2 * bands..3 * bands));
-                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record.word()));
+                let slopes = first.iter().zip(second).zip(diffuse).zip(row.products(record.path()));
                 for (out, (((a, b), rho), product)) in out.iter_mut().zip(slopes) {
                     let [at, bt] = record.moment.map(f64::from);
                     *out += scale * product * rho * (a * at + b * bt);
@@ -272,9 +272,9 @@ impl System<'_> {
 
     /// Gives elements that lie inside a body, as far as their rays can tell, the irradiance of a neighbour, in the
     /// gathered table: a sliver of them may show at the body's edge.
-    pub fn extend(&self, table: &mut [f64]) {
+    pub fn fill_absent_rows(&self, table: &mut [f64]) {
         for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
-            let Some(near) = self.stand_in(unknown, &row) else { continue };
+            let Some(near) = self.substitute_row(unknown, &row) else { continue };
             for level in 0..self.shape.levels {
                 let (to, from) = (self.shape.at(unknown, level), self.shape.at(near, level));
                 for (band, (to, from)) in to.zip(from).enumerate() {
@@ -287,13 +287,13 @@ impl System<'_> {
     }
 
     /// The same of the straight sky, in its table.
-    pub fn extend_straight(&self, values: &mut [f64], variance: &mut [f32]) {
+    pub fn fill_absent_straight(&self, values: &mut [f64], variance: &mut [f32]) {
         let stride = straight::stride(self.shape.bands);
         if values.is_empty() {
             return;
         }
         for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
-            let Some(near) = self.stand_in(unknown, &row) else { continue };
+            let Some(near) = self.substitute_row(unknown, &row) else { continue };
             variance.set(unknown, variance.at(near));
             for band in 0..stride {
                 let value = if band < self.shape.bands || band + 3 == stride {
@@ -307,10 +307,10 @@ impl System<'_> {
     }
 
     /// The neighbour whose irradiance an element inside a body takes.
-    pub fn stand_in(&self, unknown: usize, row: &RowView<'_>) -> Option<usize> {
-        let hidden = row.row.state >= TRACED && row.row.exposed == 0.0;
-        let exposed = |near: &usize| self.coupling.row(*near).exposed > 0.0;
-        if hidden { self.elements.neighbours(unknown).find(exposed) } else { None }
+    pub fn substitute_row(&self, unknown: usize, row: &RowView<'_>) -> Option<usize> {
+        let hidden = row.row.state >= TRACED && row.row.visible_share == 0.0;
+        let visible_share = |near: &usize| self.coupling.row(*near).visible_share > 0.0;
+        if hidden { self.elements.neighbours(unknown).find(visible_share) } else { None }
     }
 
     /// In those of the bands `dark`, as bits, in which anything that reflects diffusely is lit: sets `radiance` to the mean
@@ -324,7 +324,7 @@ impl System<'_> {
                 let area = self.scene.areas().at(facet) * self.elements.share(unknown);
                 sent += area * self.scene.emission(self.scene.material(facet)).at(band);
                 if self.scene.diffuse(self.scene.material(facet)).at(band) > 0.0 {
-                    let area = area * f64::from(row.row.exposed);
+                    let area = area * f64::from(row.row.visible_share);
                     sum += area * irradiance.at(self.shape.at(unknown, self.shape.levels - 1).start + band);
                     all += area;
                 }

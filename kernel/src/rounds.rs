@@ -31,7 +31,7 @@ const FINE_IMAGE: f64 = 2e-3;
 const REGION_FACTOR: f64 = 1.15;
 
 /// The tolerance of the solution of an image's first round.
-pub fn first(asked: f64) -> f64 {
+pub fn first_tolerance(asked: f64) -> f64 {
     if GATHERS {
         asked.max(COARSEST.min(FIRST_ROUND_FACTOR * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)))
     } else {
@@ -56,7 +56,7 @@ pub struct Round {
 
 /// The tolerance of another round for an image of which `asked` was wanted, after the round `last`, number `rounds`, and
 /// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
-pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
+pub fn next_tolerance(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let coarse = last.tolerance > asked;
     let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
@@ -69,7 +69,7 @@ pub fn again(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> O
     (!done && step <= STEPS.1 && check_tolerance(next).is_ok()).then_some(next)
 }
 
-/// As [`again`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.
+/// As [`next_tolerance`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.
 pub fn at_once(asked: f64, look: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
-    (look.estimate > REGION_FACTOR * asked).then(|| again(asked, look, before, rounds)).flatten()
+    (look.estimate > REGION_FACTOR * asked).then(|| next_tolerance(asked, look, before, rounds)).flatten()
 }

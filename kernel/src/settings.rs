@@ -6,10 +6,10 @@
 use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
 use crate::base::math::{clamp, pow};
+use crate::coupling::mirror_path::MIRRORS_MOST;
 use crate::coupling::rows::RowSettings;
-use crate::coupling::word::MIRRORS_MOST;
 use crate::radiosity::beam::BeamSettings;
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
 use crate::view::chain::ChainSettings;
@@ -98,7 +98,7 @@ pub fn unmerged(rows: &RowSettings) -> usize {
     4 * rows.most_rays() as usize
 }
 
-/// Whether planes are compared ([`crate::coupling::facing::Facing`]): closed forms are for rows that keep no directions of the sky.
+/// Whether planes are compared ([`crate::coupling::plane_sides::PlaneSides`]): closed forms are for rows that keep no directions of the sky.
 pub fn planes(scene: &Scene<'_>, rows: &RowSettings) -> bool {
     !rows.directional && (rows.all || scene.largest_diffuse() > 0.0)
 }
@@ -115,9 +115,9 @@ pub fn straight_goal(scene: &Scene<'_>, budget: &ErrorBudget) -> f64 {
 }
 
 /// Orders of reflection are kept apart only where their number is bounded, and small; one level counts all.
-pub fn shape(max_bounces: Option<u32>, bands: usize) -> Shape {
+pub fn shape(max_bounces: Option<u32>, bands: usize) -> TableShape {
     let levels = max_bounces.filter(|&b| b <= 32).map_or(1, |b| b.max(1) as usize + 1);
-    Shape { levels, bands }
+    TableShape { levels, bands }
 }
 
 /// How the beams that mirrors throw are traced; `None` where the scene has no use for them.

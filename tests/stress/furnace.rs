@@ -4,7 +4,7 @@ use crate::budget::{Allowed, FURNACE, PIXEL, SOLVE, SOLVE_BRIGHT, SOLVE_BRIGHTES
 use crate::case::{Case, perspective, within};
 use crate::support::scenes;
 use crate::support::twin::Material;
-use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::chain::{RaySample, Terms};
 use blik_kernel::ray::Ray;
 use glam::{DVec3, dvec3};
 use std::f64::consts::PI;
@@ -64,7 +64,7 @@ fn chains_that_meet_edges_and_corners_stay_within() {
                 }
                 let ray = Ray::new(solved.scene.to_scene(origin), aim.normalize());
                 let mut terms = Terms::ZERO;
-                solved.radiance(&ray, Sample::Alone(1), &mut terms);
+                solved.radiance(&ray, RaySample::Integrate(1), &mut terms);
                 let off = (terms.sum(0) - 1.0).abs();
                 assert!(off <= FURNACE.error, "from {origin} to {x} {y} {z}: off by {off:.1e}");
             }

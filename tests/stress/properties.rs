@@ -56,12 +56,12 @@ proptest! {
                 let kept: f64 = row.targets.iter().map(|r| {
                     let facet = geometry.elements().facet_of(r.unknown()).0;
                     let specular = geometry.scene().specular(geometry.scene().material(facet))[0];
-                    r.weight * row.products(r.word())[0] * (1.0 - specular)
+                    r.weight * row.products(r.path())[0] * (1.0 - specular)
                 }).sum();
-                let mirrored = row.escapes.filter(|b| row.depth(b.word) > 0);
-                let through: f64 = mirrored.map(|b| b.total() * row.products(b.word)[0]).sum();
+                let mirrored = row.escapes.filter(|b| row.depth(b.path) > 0);
+                let through: f64 = mirrored.map(|b| b.total() * row.products(b.path)[0]).sum();
                 let off = kept + through - row.row.blocked;
-                let lost = row.row.lost;
+                let lost = row.row.truncated_weight;
                 prop_assert!(off <= ROW.error && off >= -lost - ROW.error, "row {unknown}: {off:.1e}, lost {lost:.1e}");
             }
             Ok(())

@@ -8,7 +8,7 @@ use crate::support::scene_file::Camera;
 use crate::support::scenes::Mesh;
 use crate::support::twin;
 use blik_kernel::camera::{CameraInput, Projection, Sampling};
-use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::chain::{RaySample, Terms};
 use blik_kernel::host::{Geometry, GeometryMemory, Host, Lit, Settings};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
@@ -212,6 +212,6 @@ pub fn radiance(lit: &Lit<'_>, origin: [f64; 3], direction: [f64; 3], band: usiz
     let (origin, direction) = (Vec3::from_array(origin), Vec3::from_array(direction));
     let ray = Ray::new(solved.scene.to_scene(origin), direction.normalize());
     let mut terms = Terms::ZERO;
-    solved.radiance(&ray, Sample::Alone(1), &mut terms);
+    solved.radiance(&ray, RaySample::Integrate(1), &mut terms);
     terms.sum(band)
 }

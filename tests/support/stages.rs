@@ -12,9 +12,9 @@ use blik_kernel::camera::{Camera, CameraInput};
 use blik_kernel::chain::Solved;
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
-use blik_kernel::facing::Facing;
 use blik_kernel::image::{self, Tally, Target};
 use blik_kernel::light::Light;
+use blik_kernel::plane_sides::PlaneSides;
 use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::scene::{Scene, SceneInput};
 use blik_kernel::settings;
@@ -22,7 +22,7 @@ use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
 use blik_kernel::sky::{SkyInput, SkyModel};
 use blik_kernel::stages::{self, Beams, BlockPlace, CouplingRows, Executor, Lighting, Merge, Sizes};
-use blik_kernel::subdivide::Cut;
+use blik_kernel::subdivide::SubdivisionTree;
 use blik_kernel::sun::SunInput;
 use std::ops::Range;
 
@@ -109,7 +109,7 @@ impl Workspace {
             // what a table of planes takes at most
             planes: vec![0xa5; 10 << 20],
             // trees of quarters, at the tightest tolerance of these tests
-            trees: vec![0xa5; Cut::bytes(facets, 5e-4).unwrap()],
+            trees: vec![0xa5; SubdivisionTree::bytes(facets, 5e-4).unwrap()],
             // solutions of small rooms: sixteen values of each unknown and band, and those of the images of the sun
             tables: Tables {
                 kept: vec![0xa5; 64 * (8 * bands * unknowns + 2 * facets) + 65536],
@@ -219,16 +219,17 @@ pub fn run(
 
     // uniform skies need no directions: what nothing hides is in closed form then
     let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
-    let facing = Facing::new(&scene, &bvh, !directional, &mut work.planes)?;
+    let plane_sides = PlaneSides::new(&scene, &bvh, !directional, &mut work.planes)?;
     let asked = settings::Settings { directional, ..settings::Settings::new(plan.tolerance, None)? };
-    let mut cut = Cut::new(&scene, &asked.budget, &mut work.trees)?;
+    let mut cut = SubdivisionTree::new(&scene, &asked.budget, &mut work.trees)?;
     let mut run = Backward { parts };
-    counts.visibility += stages::refine(&scene, &bvh, &facing, &asked, &mut cut, &mut run)?;
+    counts.visibility += stages::refine(&scene, &bvh, &plane_sides, &asked, &mut cut, &mut run)?;
     let bytes = Elements::bytes(&cut)?;
     let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
     let rows = asked.rows(&scene);
-    let rows = CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, facing: &facing, rows };
+    let rows =
+        CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides: &plane_sides, rows };
     let places = &mut work.places[..rows.places()];
     let (places, end) = rows.fill_in(work.blocks.bytes_mut(), places, false, &mut run)?;
     let mut blocks = [Block::EMPTY; BLOCKS];

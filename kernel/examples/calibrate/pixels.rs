@@ -2,7 +2,7 @@
 
 use blik_kernel::Error;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
-use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::chain::{RaySample, Terms};
 use blik_kernel::host::Lit;
 use blik_kernel::image::{self, Tally, Target};
 use blik_kernel::qmc::{Sequence, hash2};
@@ -52,13 +52,13 @@ pub fn compare(lit: &Lit<'_>, input: &CameraInput, rays: u32) -> Result<Sampled,
         solved.bvh.closest(&centre)?;
         let mut terms = Terms::ZERO;
         let mut alone = Terms::ZERO;
-        solved.radiance(&centre, Sample::Glance(hash2(row as u32, column as u32)), &mut alone);
+        solved.radiance(&centre, RaySample::Probe(hash2(row as u32, column as u32)), &mut alone);
         let seed = hash2(pixel as u32, 0x0a2e_a000);
         let sequence = Sequence::new(seed);
         for index in 0..rays {
             let (x, y) = sequence.pair(index, 0);
             let ray = camera.ray(column as f64 + x, row as f64 + y);
-            solved.radiance(&ray, Sample::OneOf { seed, index }, &mut terms);
+            solved.radiance(&ray, RaySample::Stratum { seed, index }, &mut terms);
         }
         Some((0..bands).map(|b| (terms.sum(b) / f64::from(rays), alone.sum(b) as f32)).collect::<Vec<_>>())
     };

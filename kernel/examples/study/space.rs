@@ -4,7 +4,7 @@ use crate::case::{Case, SkyOf, within};
 use crate::chart::{Figure, Series};
 use crate::cylinders;
 use crate::support::twin::Material;
-use blik_kernel::chain::{Sample, Terms};
+use blik_kernel::chain::{RaySample, Terms};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
 use glam::DVec3;
@@ -49,7 +49,7 @@ fn line(ratio: f64, truth: &[Truth], rays: Option<u32>, tolerance: f64) -> (f64,
         let look = |(index, t): (u32, &Truth)| {
             let origin = solved.scene.to_scene(Vec3::from_array(t.origin.to_array()));
             let mut terms = Terms::ZERO;
-            let path = solved.radiance(&Ray::new(origin, -Vec3::Y), Sample::Alone(index), &mut terms);
+            let path = solved.radiance(&Ray::new(origin, -Vec3::Y), RaySample::Integrate(index), &mut terms);
             (terms.sum(0), f64::from(path.rays))
         };
         (0..).zip(truth).map(look).collect()

@@ -1,7 +1,7 @@
 //! Couplings in baked blocks.
 
 use super::bundle::Bundles;
-use super::word::{MIRRORS_MOST, STRAIGHT, Word};
+use super::mirror_path::{MIRRORS_MOST, MirrorPath, STRAIGHT};
 use super::{ABSENT, BLOCKED, Block, ENCLOSED, Head, Record, Row};
 use crate::base::arena::View;
 use crate::base::arena::Writer;
@@ -12,11 +12,11 @@ use crate::scene::Scene;
 
 impl<'m> Block<'m> {
     pub(crate) fn put(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
-        let words = self.words.len();
-        writer.put(&[Head { capacity: words as u64, room: self.head.rows, ..self.head }])?;
+        let paths = self.paths.len();
+        writer.put(&[Head { capacity: paths as u64, room: self.head.rows, ..self.head }])?;
         writer.put(self.rows)?;
-        writer.put(self.words)?;
-        writer.put(self.products.head(words * self.head.bands as usize))?;
+        writer.put(self.paths)?;
+        writer.put(self.products.head(paths * self.head.bands as usize))?;
         writer.put(self.records)
     }
 
@@ -31,40 +31,40 @@ impl<'m> Block<'m> {
         let counted = head.first <= unknowns
             && head.rows <= unknowns - head.first
             && head.room == head.rows
-            && head.capacity == head.words
-            && (1..=u64::from(BLOCKED)).contains(&head.words)
+            && head.capacity == head.paths
+            && (1..=u64::from(BLOCKED)).contains(&head.paths)
             && head.records <= u64::from(u32::MAX)
             && head.bands == scene.bands() as u64
             && head.directional == u64::from(directional);
         if !counted {
             return Err(Error::Block);
         }
-        let words = head.words as usize;
+        let paths = head.paths as usize;
         let block = Block {
             head,
             rows: view.take(head.rows as usize + 1)?,
-            words: view.take(words)?,
-            products: view.take(words.checked_mul(scene.bands()).ok_or(Error::Block)?)?,
+            paths: view.take(paths)?,
+            products: view.take(paths.checked_mul(scene.bands()).ok_or(Error::Block)?)?,
             records: view.take(usize::try_from(head.records).map_err(|_| Error::Block)?)?,
         };
         let sound = block.words_sound(scene) && block.rows_sound(elements.unknowns());
         if sound { Ok(block) } else { Err(Error::Block) }
     }
 
-    /// Words are trees of mirror classes whose products are theirs.
+    /// Whether the paths are a tree of mirror classes and hold the products of their reflectances.
     fn words_sound(&self, scene: &Scene<'_>) -> bool {
         let bands = scene.bands();
-        let of = |word: usize| self.products.part(word * bands..(word + 1) * bands);
-        self.words.iter().enumerate().all(|(at, word)| {
+        let of = |path: usize| self.products.part(path * bands..(path + 1) * bands);
+        self.paths.iter().enumerate().all(|(at, path)| {
             if at == usize::from(STRAIGHT) {
-                return word.depth == 0 && of(at).iter().all(|p| *p == 1.0);
+                return path.depth == 0 && of(at).iter().all(|p| *p == 1.0);
             }
-            let parent: Word = self.words.at(word.parent as usize);
-            let specular = scene.specular(word.class as usize);
-            let factors = of(word.parent as usize).iter().zip(specular);
-            (word.parent as usize) < at
-                && word.depth == parent.depth + 1
-                && word.depth as usize <= MIRRORS_MOST
+            let parent: MirrorPath = self.paths.at(path.parent as usize);
+            let specular = scene.specular(path.class as usize);
+            let factors = of(path.parent as usize).iter().zip(specular);
+            (path.parent as usize) < at
+                && path.depth == parent.depth + 1
+                && path.depth as usize <= MIRRORS_MOST
                 && specular.len() == bands
                 && of(at).iter().zip(factors).all(|(p, (q, rho))| *p == q * rho)
         })
@@ -85,26 +85,27 @@ impl<'m> Block<'m> {
     fn row_sound(&self, row: &Row, end: u32, unknowns: usize) -> bool {
         let targets = self.records.part(row.start as usize..row.escapes as usize);
         let escapes = Bundles::new(self.records.part(row.escapes as usize..end as usize));
-        let known = |word: u16| (word as usize) < self.words.len();
+        let known = |path: u16| (path as usize) < self.paths.len();
         // closed chains count twice at most; gradients of a share of the hemisphere: 36 times it at most
         let share = |weight: f64| (0.0..=2.0 + 1e-6).contains(&weight);
         let bounded = |values: &[f32]| values.iter().all(|g| g.abs() <= 100.0);
-        let weighed =
-            |r: &Record| share(r.weight) && [&r.gradient[..], &r.checks, &r.moment].into_iter().all(bounded);
+        let weighed = |r: &Record| {
+            share(r.weight) && [&r.gradient[..], &r.half_differences, &r.moment].into_iter().all(bounded)
+        };
         (ABSENT..=ENCLOSED).contains(&row.state)
-            && (0.0..=1.0).contains(&row.exposed)
-            && row.lost >= 0.0
-            && row.lost.is_finite()
+            && (0.0..=1.0).contains(&row.visible_share)
+            && row.truncated_weight >= 0.0
+            && row.truncated_weight.is_finite()
             && (-1e-6..=2.0 + 1e-6).contains(&row.blocked)
             && targets
                 .iter()
-                .all(|r| !r.is_escape() && r.unknown() < unknowns && known(r.word()) && weighed(r))
+                .all(|r| !r.is_escape() && r.unknown() < unknowns && known(r.path()) && weighed(r))
             && escapes.rest().iter().all(|word| *word == 0)
             && escapes.into_iter().all(|b| {
-                (known(b.word) || b.word == BLOCKED)
+                (known(b.path) || b.path == BLOCKED)
                     && share(b.total())
                     && bounded(&b.gradient)
-                    && bounded(&b.checks)
+                    && bounded(&b.half_differences)
             })
     }
 }

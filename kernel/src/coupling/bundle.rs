@@ -1,6 +1,6 @@
 //! Escapes to the sky in little memory: most rays of a row count alike and differ in their directions alone.
 //!
-//! While a row grows an escape is a [`Record`]; in a finished row rays of the same word, weight, gradient and checks
+//! While a row grows an escape is a [`Record`]; in a finished row rays of the same path, weight, gradient and half differences
 //! are a bundle, and each costs the four bytes of its direction. Bundles stand where the row's records did: 32-bit
 //! words, each bundle a head and its directions, zeros to the end of the last record.
 
@@ -11,23 +11,23 @@ use crate::base::math::Vec3;
 use crate::base::octahedron::{self, SKY_BITS};
 use core::cmp::Ordering;
 
-/// Words of a bundle's head: count, word, weight (2), gradient (2), checks (4).
+/// Words of a bundle's head: count, path, weight (2), gradient (2), half differences (4).
 const HEAD: usize = 10;
 
 /// Words of a record.
 const RECORD_WORDS: usize = size_of::<Record>() / size_of::<u32>();
 
-/// Rays that leave a row by the same word and count alike.
+/// Rays that leave a row by the same path and count alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bundle<'m> {
-    /// The word.
-    pub word: u16,
+    /// Number of their path.
+    pub path: u16,
     /// Share of the cosine hemisphere of each ray, mean over the element.
     pub weight: f64,
     /// Change of the weight with the local coordinates.
     pub gradient: [f32; 2],
-    /// As [`Record::checks`].
-    pub checks: [f32; 4],
+    /// As [`Record::half_differences`].
+    pub half_differences: [f32; 4],
     /// The rays' directions, packed; of a row without directions, one ray for all.
     pub packed: &'m [u32],
 }
@@ -74,17 +74,17 @@ impl<'m> Iterator for Bundles<'m> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<Bundle<'m>> {
-        let (&[count, word, w0, w1, g0, g1, c0, c1, c2, c3], rest) = self.0.split_first_chunk::<HEAD>()?;
+        let (&[count, path, w0, w1, g0, g1, c0, c1, c2, c3], rest) = self.0.split_first_chunk::<HEAD>()?;
         if count == 0 {
             return None;
         }
         let (packed, rest) = rest.split_at_checked(count as usize)?;
         self.0 = rest;
         Some(Bundle {
-            word: word as u16,
+            path: path as u16,
             weight: f64::from_bits(u64::from(w0) | u64::from(w1) << 32),
             gradient: [g0, g1].map(f32::from_bits),
-            checks: [c0, c1, c2, c3].map(f32::from_bits),
+            half_differences: [c0, c1, c2, c3].map(f32::from_bits),
             packed,
         })
     }
@@ -94,15 +94,16 @@ impl<'m> Iterator for Bundles<'m> {
 fn head(record: &Record) -> [u32; HEAD] {
     let weight = record.weight.to_bits();
     let [g0, g1] = record.gradient.map(f32::to_bits);
-    let [c0, c1, c2, c3] = record.checks.map(f32::to_bits);
-    [0, u32::from(record.word()), weight as u32, (weight >> 32) as u32, g0, g1, c0, c1, c2, c3]
+    let [c0, c1, c2, c3] = record.half_differences.map(f32::to_bits);
+    [0, u32::from(record.path()), weight as u32, (weight >> 32) as u32, g0, g1, c0, c1, c2, c3]
 }
 
-/// An order in which escapes of the same word that count alike are neighbours.
+/// An order in which escapes of the same path that count alike are neighbours.
 #[inline]
 pub(super) fn order(a: &Record, b: &Record) -> Ordering {
-    let of =
-        |r: &Record| (r.weight.to_bits(), r.gradient.map(f32::to_bits), r.checks.map(f32::to_bits), r.key);
+    let of = |r: &Record| {
+        (r.weight.to_bits(), r.gradient.map(f32::to_bits), r.half_differences.map(f32::to_bits), r.key)
+    };
     of(a).cmp(&of(b))
 }
 
@@ -139,13 +140,13 @@ mod tests {
             let angle = f64::from(i) * 0.37;
             let direction = Vec3::new(angle.cos(), angle.sin(), 0.3).normalize();
             let record = Record::escape(Some(direction), (i % 3) as u16, 0.25, [i as f32 % 2.0, 1.0]);
-            Record { checks: [0.5, -0.0, 0.0, i as f32 % 2.0], ..record }
+            Record { half_differences: [0.5, -0.0, 0.0, i as f32 % 2.0], ..record }
         };
         for count in [0, 1, 2, 40] {
             let mut records = [Record::default(); 40];
             records.iter_mut().zip(0..).for_each(|(record, i)| *record = escape(i));
             let records = &mut records[..count];
-            records.sort_by(|a, b| a.word().cmp(&b.word()).then(order(a, b)));
+            records.sort_by(|a, b| a.path().cmp(&b.path()).then(order(a, b)));
             let mut before = [Record::default(); 40];
             before[..count].copy_from_slice(records);
             let needed = pack(records);
@@ -156,9 +157,13 @@ mod tests {
                 for packed in bundle.packed {
                     let record = before.next().unwrap();
                     let own = Record { key: record.key, weight: bundle.weight, ..Record::default() };
-                    let own = Record { gradient: bundle.gradient, checks: bundle.checks, ..own };
+                    let own = Record {
+                        gradient: bundle.gradient,
+                        half_differences: bundle.half_differences,
+                        ..own
+                    };
                     assert_eq!(&own, record);
-                    assert_eq!((bundle.word, *packed), (record.word(), record.packed()));
+                    assert_eq!((bundle.path, *packed), (record.path(), record.packed()));
                 }
                 // as far apart as directions are rounded
                 let (kept, given) =

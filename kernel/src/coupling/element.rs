@@ -10,7 +10,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
 use crate::base::quarter::{self, Path, QUARTERS};
-use crate::coupling::subdivide::{Cut, Node};
+use crate::coupling::subdivide::{Node, SubdivisionTree};
 use crate::scene::Scene;
 
 /// Which elements each facet has.
@@ -66,9 +66,9 @@ fn walk(
 
 impl<'m> Elements<'m> {
     /// Bytes for facets cut like this.
-    pub fn bytes(cut: &Cut<'_>) -> Result<usize, Error> {
-        let leaves = cut.nodes().iter().filter(|n| n.child == 0).count();
-        Elements::need(cut.facets(), cut.nodes().len(), leaves).bytes()
+    pub fn bytes(tree: &SubdivisionTree<'_>) -> Result<usize, Error> {
+        let leaves = tree.nodes().iter().filter(|n| n.child == 0).count();
+        Elements::need(tree.facets(), tree.nodes().len(), leaves).bytes()
     }
 
     fn need(facets: usize, nodes: usize, elements: usize) -> Need {
@@ -76,12 +76,16 @@ impl<'m> Elements<'m> {
     }
 
     /// The elements of a cut.
-    pub fn new(scene: &Scene<'_>, cut: &Cut<'_>, memory: &'m mut [u8]) -> Result<Elements<'m>, Error> {
-        let (facets, trees): (usize, &[Node]) = (cut.facets(), cut.nodes());
+    pub fn new(
+        scene: &Scene<'_>,
+        tree: &SubdivisionTree<'_>,
+        memory: &'m mut [u8],
+    ) -> Result<Elements<'m>, Error> {
+        let (facets, trees): (usize, &[Node]) = (tree.facets(), tree.nodes());
         if facets != scene.facets() {
             return Err(Error::Mismatch { what: "cut" });
         }
-        let needed = Elements::bytes(cut)?;
+        let needed = Elements::bytes(tree)?;
         let elements = trees.iter().filter(|n| n.child == 0).count();
         let mut arena = Arena::new(memory, needed)?;
         let first = arena.take::<u32>(facets + 1)?;
@@ -220,18 +224,18 @@ mod tests {
         let scene = Scene::new(&input, &mut memory).unwrap();
         for cuts in [0, 1, 3, 6] {
             let mut memory = [0u8; 1 << 18];
-            let mut cut = Cut::new(&scene, &ErrorBudget::new(1e-3, 1e-3), &mut memory).unwrap();
+            let mut tree = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-3, 1e-3), &mut memory).unwrap();
             // the first facet and then always one corner and the middle of what was cut
             for _ in 0..cuts {
-                let (_, values) = cut.work();
+                let (_, values) = tree.newest_level();
                 values
                     .iter_mut()
                     .enumerate()
                     .for_each(|(i, v)| *v = if i % 4 == 0 || i % 4 == 3 { 1.0 } else { 0.0 });
-                assert!(cut.refine(&scene));
+                assert!(tree.refine(&scene));
             }
             let mut memory = [0u8; 1 << 16];
-            let elements = Elements::new(&scene, &cut, &mut memory).unwrap();
+            let elements = Elements::new(&scene, &tree, &mut memory).unwrap();
             let own = elements.unknowns_of(0, 1).map(|u| u / 2);
             assert_eq!(own.clone().count() + 1, elements.count());
             let (mut area, mut share) = (0.0, 0.0);

@@ -1,19 +1,19 @@
 //! Entries of a row to facets that nothing hides: form factors in closed form from points of the element, no rays.
 //!
-//! [`crate::coupling::facing`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
+//! [`crate::coupling::plane_sides`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
 //! each of the element's quarters takes Gauss points as near to each other as the distance asks for, and makes mean,
 //! gradients and the departure from them as rays' hits would. The quadrature's error is a small part of that which
 //! the row's rays would have.
 
-use super::sink::Sink;
-use super::word::STRAIGHT;
+use super::mirror_path::STRAIGHT;
+use super::row_builder::RowBuilder;
 use super::{BLOCKED, Record};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, clamp, fabs, pow, sqrt};
 use crate::base::quarter::{self, Path, QUARTERS, point};
 use crate::base::simd::Isa;
 use crate::coupling::element::Elements;
-use crate::coupling::facing::{Clear, Facing, Receiver};
+use crate::coupling::plane_sides::{PlaneSides, ProvenVisible, Receiver};
 use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::scene::{NO_MIRROR, Scene};
 
@@ -67,7 +67,7 @@ impl Rules {
 pub(super) struct Entries<'a, 'm> {
     pub scene: &'a Scene<'a>,
     pub elements: &'a Elements<'a>,
-    pub sink: &'a mut Sink<'m>,
+    pub builder: &'a mut RowBuilder<'m>,
     pub isa: Isa,
     /// Rays that such a row would have at most.
     pub rays: u32,
@@ -186,8 +186,8 @@ impl Entries<'_, '_> {
     pub fn add(
         mut self,
         receiver: &Receiver,
-        facing: &Facing<'_>,
-        clear: &Clear<'_>,
+        plane_sides: &PlaneSides<'_>,
+        clear: &ProvenVisible<'_>,
         known: &mut Known,
     ) -> Option<()> {
         // a small part of the error of rays, 0.9 n^-2/3
@@ -198,7 +198,7 @@ impl Entries<'_, '_> {
         let mut lanes = [Lanes { unknowns: [0; TRIANGLE_LANES], count: 0 }; 3];
         let mut blocked = Blocked::default();
         let sides = self.scene.sides();
-        for facet in facing.before(receiver.facet, receiver.side) {
+        for facet in plane_sides.before(receiver.facet, receiver.side) {
             for side in (0..sides).filter(|&side| clear.has(facet, side, sides)) {
                 for target in targets(self.scene, self.elements, facet, side) {
                     let Some(class) = place.class(self.scene, facet, side, &target) else {
@@ -309,8 +309,8 @@ impl Entries<'_, '_> {
             } else {
                 lean(place.middle, place.receiver.normal, &target.corners, target.normal)
             };
-            self.sink.push(Record {
-                checks: mark(departure),
+            self.builder.push(Record {
+                half_differences: mark(departure),
                 moment: moment.map(|m| (weight * m) as f32),
                 ..Record::target((target.unknown, (0.0, 0.0)), STRAIGHT, weight, gradient.map(|g| g as f32))
             })?;
@@ -334,7 +334,7 @@ impl Entries<'_, '_> {
     fn block(&mut self, blocked: &Blocked) -> Option<()> {
         let gradient = blocked.gradient.map(|g| g as f32);
         let record = Record::escape(None, BLOCKED, blocked.weight, gradient);
-        self.sink.push(Record { checks: mark(blocked.departure), ..record })
+        self.builder.push(Record { half_differences: mark(blocked.departure), ..record })
     }
 }
 
@@ -350,11 +350,11 @@ fn mark(departure: f64) -> [f32; 4] {
 
 /// The finished record, times `scale`, where it is one that was marked as exact.
 pub(super) fn finished(record: &Record, scale: f64) -> Option<Record> {
-    let [marked, _, one, other] = record.checks;
+    let [marked, _, one, other] = record.half_differences;
     let finished = Record {
         weight: scale * record.weight,
         gradient: record.gradient.map(|g| scale as f32 * g),
-        checks: [0.0, 0.0, one, other],
+        half_differences: [0.0, 0.0, one, other],
         moment: record.moment.map(|m| scale as f32 * m),
         ..*record
     };

@@ -6,7 +6,7 @@
 //! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
 //! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
-//! What nothing hides ([`crate::coupling::facing`]) is entered in closed form instead (`exact.rs`) where that costs less:
+//! What nothing hides ([`crate::coupling::plane_sides`]) is entered in closed form instead (`exact.rs`) where that costs less:
 //! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
 //! hemisphere, which is known.
 //!
@@ -15,8 +15,8 @@
 //! a body, and counts or not.
 
 use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
-use super::sink::Sink;
-use super::word::{MIRRORS_MOST, STRAIGHT};
+use super::mirror_path::{MIRRORS_MOST, STRAIGHT};
+use super::row_builder::RowBuilder;
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
 use crate::base::arena::{Arena, Need};
 use crate::base::budget::ErrorBudget;
@@ -26,7 +26,7 @@ use crate::base::math::{Vec3, clamp, frame, pow};
 use crate::base::qmc::{Sequence, cosine_direction, hash2, triangle};
 use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
-use crate::coupling::facing::{Clear, Facing, Receiver};
+use crate::coupling::plane_sides::{PlaneSides, ProvenVisible, Receiver};
 use crate::coupling::subdivide::INSIDE;
 use crate::rays::bvh::{Bvh, STREAM_RAYS};
 use crate::rays::inside::inside;
@@ -152,7 +152,7 @@ impl RowSettings {
         all: bool,
     ) -> Self {
         let diffuse = if all { scene.largest_diffuse().max(0.4) } else { scene.largest_diffuse() };
-        let longest = super::word::MIRRORS_MOST as u32;
+        let longest = super::mirror_path::MIRRORS_MOST as u32;
         RowSettings {
             rays: whole(pow(0.9 * diffuse / budget.solution, 1.5)),
             cutoff: budget.row_chains,
@@ -171,32 +171,32 @@ pub fn fill(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,
     elements: &Elements<'_>,
-    facing: &Facing<'_>,
+    plane_sides: &PlaneSides<'_>,
     settings: &RowSettings,
     range: Range<usize>,
     memory: &mut [u8],
 ) -> Result<usize, Error> {
     let given = memory.len();
     // the set of what is clear stands behind the block
-    let words = if facing.is_empty() || settings.directional { 0 } else { Clear::words(scene) };
+    let words = if plane_sides.is_empty() || settings.directional { 0 } else { ProvenVisible::words(scene) };
     let room = if words > 0 { Need::new().and::<u64>(words).bytes()? } else { 0 };
     let short = |needed: usize| Error::BufferTooSmall { needed: needed.saturating_add(room), given };
     let (memory, behind) = memory.split_at_mut_checked(given.saturating_sub(room)).ok_or(short(0))?;
-    let sink = match Sink::new(&range, scene.bands(), settings.directional, memory) {
+    let builder = match RowBuilder::new(&range, scene.bands(), settings.directional, memory) {
         Err(Error::BufferTooSmall { needed, .. }) => return Err(short(needed)),
-        sink => sink?,
+        builder => builder?,
     };
     let proven = if words > 0 { Arena::new(behind, room)?.take::<u64>(words)? } else { &mut [] };
     let wanted = range.len();
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
-    let mut tracer = Tracer { scene, bvh, elements, facing, settings, mean_area, sink, proven };
+    let mut tracer = Tracer { scene, bvh, elements, plane_sides, settings, mean_area, builder, proven };
     for unknown in range {
         if tracer.row(unknown).is_none() {
-            tracer.sink.drop_row();
+            tracer.builder.drop_row();
             break;
         }
     }
-    match tracer.sink.end() {
+    match tracer.builder.end() {
         0 if wanted > 0 => Err(Error::BufferTooSmall { needed: given.saturating_mul(2), given }),
         done => Ok(done),
     }
@@ -206,11 +206,11 @@ struct Tracer<'a, 'm> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh<'a>,
     elements: &'a Elements<'a>,
-    facing: &'a Facing<'a>,
+    plane_sides: &'a PlaneSides<'a>,
     settings: &'a RowSettings,
     mean_area: f64,
-    sink: Sink<'m>,
-    /// Memory of [`Clear`].
+    builder: RowBuilder<'m>,
+    /// Memory of [`ProvenVisible`].
     proven: &'m mut [u64],
 }
 
@@ -232,7 +232,7 @@ struct Tally {
     blocked: u32,
     clear: [u32; ELEMENT_PARTS],
     mirrored: [[u32; MIRROR_KINDS]; ELEMENT_PARTS],
-    lost: f64,
+    truncated_weight: f64,
     /// What is entered in closed form.
     known: Known,
     /// Rays of each part's parts, and how many of them met a black back first.
@@ -302,12 +302,16 @@ impl Tracer<'_, '_> {
         let material = self.scene.material(facet);
         let black = self.scene.diffuse(material).iter().all(|&d| d == 0.0);
         if self.scene.areas().at(facet) == 0.0 || (black && !self.settings.all) {
-            self.sink.end_row(Row::default(), Some, Record::join);
+            self.builder.end_row(Row::default(), Some, Record::join);
             return Some(());
         }
         let normal = self.scene.side_normal(facet, side);
         if opens_to_sky(self.scene, self.bvh, facet, normal) {
-            self.sink.end_row(Row { state: OPEN, exposed: 1.0, ..Row::default() }, Some, Record::join);
+            self.builder.end_row(
+                Row { state: OPEN, visible_share: 1.0, ..Row::default() },
+                Some,
+                Record::join,
+            );
             return Some(());
         }
         let start = Start {
@@ -335,7 +339,7 @@ impl Tracer<'_, '_> {
         self.rays(start, (ROW_RAYS_FEWEST.max(most / 16), most), [false; ROW_BINS], None, tally)?;
         let mixed = tally.mixed();
         if self.scene.sides() == 1 && mixed.contains(&true) {
-            self.sink.drop_row();
+            self.builder.drop_row();
             self.rays(start, (ROW_RAYS_FEWEST.max(most / 16), most), mixed, None, tally)?;
         }
         Some(())
@@ -361,15 +365,15 @@ impl Tracer<'_, '_> {
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
         let limit = (2 * most as usize).clamp(CHEAP, ROW_CLOSED_FORMS_MOST);
-        let possible = Clear::possible(self.scene, self.facing, &receiver, count);
+        let possible = ProvenVisible::possible(self.scene, self.plane_sides, &receiver, count);
         if possible == 0 || possible > limit {
             return Some(false);
         }
-        let mut clear = Clear::new(proven);
+        let mut clear = ProvenVisible::new(proven);
         clear.all = false;
         if possible <= CHEAP {
             clear.all = true;
-            clear.prove(self.scene, self.facing, &receiver, limit, count);
+            clear.prove(self.scene, self.plane_sides, &receiver, limit, count);
         }
         // what is all known needs no rays, and is exact
         if !clear.all {
@@ -377,34 +381,34 @@ impl Tracer<'_, '_> {
                 return Some(false);
             }
             clear.clear();
-            clear.prove(self.scene, self.facing, &receiver, limit, count);
+            clear.prove(self.scene, self.plane_sides, &receiver, limit, count);
         }
         *tally = Tally::default();
         if !clear.all || self.scene.largest_specular() > 0.0 {
             self.rays(start, (ROW_RAYS_FEWEST, most), [false; ROW_BINS], Some(&clear), tally)?;
             if tally.backs.iter().any(|b| *b > 0) {
-                self.sink.drop_row();
+                self.builder.drop_row();
                 return Some(false);
             }
         }
         if clear.elements == 0 {
-            self.sink.drop_row();
+            self.builder.drop_row();
             return Some(false);
         }
         let all = [true; ELEMENT_PARTS];
         let entries = Entries {
             scene: self.scene,
             elements: self.elements,
-            sink: &mut self.sink,
+            builder: &mut self.builder,
             isa: self.bvh.isa(),
             rays: most,
             slopes: slopes(all),
             departures: departures(all),
         };
-        entries.add(&receiver, self.facing, &clear, &mut tally.known)?;
+        entries.add(&receiver, self.plane_sides, &clear, &mut tally.known)?;
         let sound = tally.known.share() > 0.0 && tally.known.share() <= 1.0 + OVERFULL;
         if !sound {
-            self.sink.drop_row();
+            self.builder.drop_row();
         }
         Some(sound)
     }
@@ -418,7 +422,7 @@ impl Tracer<'_, '_> {
             let count = (ROW_RAYS_FEWEST - tally.rays).min(ROW_RAYS_TOGETHER as u32);
             self.batch(start, tally, count, None)?;
         }
-        self.sink.drop_row();
+        self.builder.drop_row();
         let wanted = enough(most, tally.rays, f64::from(tally.blocked));
         Some(f64::from(wanted) * RAY >= entries as f64)
     }
@@ -430,7 +434,7 @@ impl Tracer<'_, '_> {
         start: &Start,
         (fewest, most): (u32, u32),
         apart: [bool; ROW_BINS],
-        clear: Option<&Clear<'_>>,
+        clear: Option<&ProvenVisible<'_>>,
         tally: &mut Tally,
     ) -> Option<()> {
         *tally = Tally { apart, ..Tally::default() };
@@ -479,12 +483,12 @@ impl Tracer<'_, '_> {
             state: if enclosed { ENCLOSED } else { TRACED },
             rays: tally.rays,
             chain_rays: tally.chain_rays,
-            exposed: match (closed, hidden) {
+            visible_share: match (closed, hidden) {
                 (true, _) => 1.0,
                 (false, true) => 0.0,
                 (false, false) => (f64::from(seen) * share) as f32,
             },
-            lost: tally.lost * share,
+            truncated_weight: tally.truncated_weight * share,
             ..Row::default()
         };
         let (slopes, departures) =
@@ -502,7 +506,7 @@ impl Tracer<'_, '_> {
             let scale = kinds.get(bin / ELEMENT_PARTS).map_or(1.0, |kinds| kinds.at(kind));
             record.weight *= scale;
             record.moment = record.moment.map(|m| m * scale as f32);
-            if exposed[bin] == 0 || (record.is_escape() && record.word() == dropped) {
+            if exposed[bin] == 0 || (record.is_escape() && record.path() == dropped) {
                 return None;
             }
             let own = record.weight / f64::from(counts[bin / ELEMENT_PARTS]);
@@ -516,9 +520,15 @@ impl Tracer<'_, '_> {
                 |value: f64, to_first: bool| if to_first { [value as f32, 0.0] } else { [0.0, value as f32] };
             let ([a, b], [c, d]) = (split(difference, part < 2), split(departure, first));
             let moment = record.moment.map(|m| mean as f32 * m);
-            Some(Record { weight: mean * record.weight, gradient, checks: [a, b, c, d], moment, ..record })
+            Some(Record {
+                weight: mean * record.weight,
+                gradient,
+                half_differences: [a, b, c, d],
+                moment,
+                ..record
+            })
         };
-        self.sink.end_row(stats, finish, Record::join);
+        self.builder.end_row(stats, finish, Record::join);
     }
 
     /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
@@ -527,7 +537,7 @@ impl Tracer<'_, '_> {
         start: &Start,
         tally: &mut Tally,
         count: u32,
-        clear: Option<&Clear<'_>>,
+        clear: Option<&ProvenVisible<'_>>,
     ) -> Option<()> {
         let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); ROW_RAYS_TOGETHER];
         let mut bins = [0; ROW_RAYS_TOGETHER];
@@ -557,7 +567,7 @@ impl Tracer<'_, '_> {
         let (dx, dy, dz) = cosine_direction(p, q);
         let (u, v) = self.elements.in_facet(start.element, a, b);
         let origin = Surface::new(self.scene, start.facet, start.side, u, v);
-        (origin.leave(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
+        (origin.spawn_ray(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
     }
 
     /// What ray number `tally.rays` of a row finds, of which the first hit is known, and its mirror chain.
@@ -568,7 +578,7 @@ impl Tracer<'_, '_> {
         tally: &mut Tally,
         (mut ray, mut met): (Ray, Option<Hit>),
         bin: usize,
-        clear: Option<&Clear<'_>>,
+        clear: Option<&ProvenVisible<'_>>,
     ) -> Option<()> {
         let (part, index) = (tally.rays as usize % ELEMENT_PARTS, tally.rays / ELEMENT_PARTS as u32);
         let sequence = &start.sequences[part];
@@ -576,16 +586,16 @@ impl Tracer<'_, '_> {
         *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
         let mut mark = [bin as f32, index as f32];
-        let (mut word, mut weight) = (STRAIGHT, 1.0);
-        let ray_start = self.sink.used();
+        let (mut path, mut weight) = (STRAIGHT, 1.0);
+        let ray_start = self.builder.used();
         loop {
-            tally.chain_rays += u32::from(word != STRAIGHT);
+            tally.chain_rays += u32::from(path != STRAIGHT);
             let Some(hit) = met else {
-                let escape = Record::escape(self.kept(ray.direction), word, weight, mark);
-                return self.sink.push(escape);
+                let escape = Record::escape(self.kept(ray.direction), path, weight, mark);
+                return self.builder.push(escape);
             };
             let surface = Surface::of_hit(self.scene, &hit);
-            if word == STRAIGHT {
+            if path == STRAIGHT {
                 tally.backs[bin] += u32::from(surface.is_none());
                 if tally.apart[bin] && inside(self.bvh, &ray, self.scene.side_normal(start.facet, start.side))
                 {
@@ -593,7 +603,7 @@ impl Tracer<'_, '_> {
                     return Some(());
                 }
             }
-            let known = word == STRAIGHT
+            let known = path == STRAIGHT
                 && clear
                     .zip(surface.as_ref())
                     .is_some_and(|(c, s)| c.has(s.facet, s.side, self.scene.sides()));
@@ -608,45 +618,45 @@ impl Tracer<'_, '_> {
                     *rays += 1;
                     mark[0] += ((1 + kind) * ROW_BINS) as f32;
                 }
-            } else if word == STRAIGHT {
+            } else if path == STRAIGHT {
                 tally.blocked += 1;
-                self.sink.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
+                self.builder.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
             }
             let Some(surface) = surface else { return Some(()) };
             let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
             if self.scene.glows(surface.material) && !known {
-                self.sink.push(Record::target(target, word, weight, mark))?;
+                self.builder.push(Record::target(target, path, weight, mark))?;
             }
             let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
-            let depth = self.sink.words.get(word).depth;
+            let depth = self.builder.paths.get(path).depth;
             if depth >= self.settings.mirrors {
                 let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
-                let rest = weight * self.sink.words.largest(word) * rho;
-                tally.lost += rest;
+                let rest = weight * self.builder.paths.largest(path) * rho;
+                tally.truncated_weight += rest;
                 if depth as usize >= MIRRORS_MOST {
-                    self.sink.close(ray_start, rest);
+                    self.builder.close(ray_start, rest);
                 }
                 return Some(());
             }
-            let next = match self.sink.spell(word, mirror.class, self.scene) {
+            let next = match self.builder.extend_path(path, mirror.class, self.scene) {
                 Ok(next) => next,
                 Err(true) => {
-                    tally.lost += weight * self.sink.words.largest(word);
+                    tally.truncated_weight += weight * self.builder.paths.largest(path);
                     return Some(());
                 }
                 Err(false) => return None,
             };
-            if self.sink.words.largest(next) * weight < self.settings.cutoff {
-                let rest = weight * self.sink.words.largest(next);
-                tally.lost += rest;
-                self.sink.close(ray_start, rest);
+            if self.builder.paths.largest(next) * weight < self.settings.cutoff {
+                let rest = weight * self.builder.paths.largest(next);
+                tally.truncated_weight += rest;
+                self.builder.close(ray_start, rest);
                 return Some(());
             }
             let (s, t) = lobe_point(sequence, index, depth);
-            let (direction, share) = surface.go_on(self.scene, &mirror, ray.direction, s, t);
-            word = next;
+            let (direction, share) = surface.sample_reflection(self.scene, &mirror, ray.direction, s, t);
+            path = next;
             weight *= share;
-            ray = surface.leave(direction);
+            ray = surface.spawn_ray(direction);
             met = self.bvh.closest(&ray);
         }
     }

@@ -1,8 +1,8 @@
 //! How finely each facet is cut: into quarters, and those again, where what arrives varies in a way that no linear
 //! function follows, such as around what stands on a facet or pierces it.
 //!
-//! Geometry, materials and tolerance decide, never sky and sun. Level by level: [`Cut::work`] gives the newest
-//! triangles, [`Work::probe`] (on any range of them) looks how uneven they are, [`Cut::refine`] quarters those whose
+//! Geometry, materials and tolerance decide, never sky and sun. Level by level: [`SubdivisionTree::newest_level`] gives the newest
+//! triangles, [`Level::probe`] (on any range of them) looks how uneven they are, [`SubdivisionTree::refine`] quarters those whose
 //! error counts most. Triangles far larger than what stands close before them are quartered first: their probed points
 //! are too far from each other to tell.
 
@@ -15,7 +15,7 @@ use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::base::quarter::{Path, QUARTERS, out_of};
 use crate::base::simd::Isa;
 use crate::coupling::detail::DetailSearch;
-use crate::coupling::facing::{Clear, Facing, Receiver, SIDE_SET_WORDS};
+use crate::coupling::plane_sides::{PlaneSides, ProvenVisible, Receiver, SIDE_SET_WORDS};
 use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::rays::bvh::{AnswerBuffer, Bvh};
 use crate::rays::surface::{Surface, opens_to_sky};
@@ -77,7 +77,7 @@ plain_struct! {
 
 /// The facets' trees of quarters while they grow.
 #[derive(Debug)]
-pub struct Cut<'m> {
+pub struct SubdivisionTree<'m> {
     nodes: &'m mut [Node],
     unevenness: &'m mut [f64],
     used: usize,
@@ -93,7 +93,7 @@ pub struct Cut<'m> {
 
 /// The newest triangles.
 #[derive(Clone, Copy, Debug)]
-pub struct Work<'a> {
+pub struct Level<'a> {
     nodes: &'a [Node],
     area: f64,
 }
@@ -147,7 +147,7 @@ fn most_nodes(facets: usize, tolerance: f64) -> usize {
     )
 }
 
-impl<'m> Cut<'m> {
+impl<'m> SubdivisionTree<'m> {
     /// Bytes for a scene of so many facets.
     pub fn bytes(facets: usize, tolerance: f64) -> Result<usize, Error> {
         let nodes = most_nodes(facets, tolerance);
@@ -160,9 +160,13 @@ impl<'m> Cut<'m> {
     }
 
     /// Every facet whole, and to be probed.
-    pub fn new(scene: &Scene<'_>, budget: &ErrorBudget, memory: &'m mut [u8]) -> Result<Cut<'m>, Error> {
+    pub fn new(
+        scene: &Scene<'_>,
+        budget: &ErrorBudget,
+        memory: &'m mut [u8],
+    ) -> Result<SubdivisionTree<'m>, Error> {
         let facets = scene.facets();
-        let mut arena = Arena::new(memory, Cut::bytes(facets, budget.solution)?)?;
+        let mut arena = Arena::new(memory, SubdivisionTree::bytes(facets, budget.solution)?)?;
         let capacity = most_nodes(facets, budget.solution);
         let nodes = arena.take::<Node>(capacity)?;
         let unevenness = arena.take::<f64>(capacity)?;
@@ -171,7 +175,7 @@ impl<'m> Cut<'m> {
             *node = Node { facet: facet as u32, ..Node::default() };
             *expected = 0.0;
         }
-        Ok(Cut {
+        Ok(SubdivisionTree {
             nodes,
             unevenness,
             used: facets,
@@ -185,9 +189,9 @@ impl<'m> Cut<'m> {
     }
 
     /// The triangles to be probed, and where their unevenness is to stand: what is expected of each, to begin with.
-    pub fn work(&mut self) -> (Work<'_>, &mut [f64]) {
+    pub fn newest_level(&mut self) -> (Level<'_>, &mut [f64]) {
         let range = self.fresh..self.used;
-        (Work { nodes: self.nodes.part(range.clone()), area: self.area }, self.unevenness.part_mut(range))
+        (Level { nodes: self.nodes.part(range.clone()), area: self.area }, self.unevenness.part_mut(range))
     }
 
     /// Quarters those of the probed triangles whose errors count most, and says whether there are new ones.
@@ -267,7 +271,7 @@ fn threshold<V: Iterator<Item = f64>>(values: impl Fn() -> V, left: f64, cuts: u
     threshold
 }
 
-impl Work<'_> {
+impl Level<'_> {
     /// Triangles.
     pub fn len(&self) -> usize {
         self.nodes.len()
@@ -289,7 +293,7 @@ impl Work<'_> {
         &self,
         scene: &Scene<'_>,
         bvh: &Bvh<'_>,
-        facing: &Facing<'_>,
+        plane_sides: &PlaneSides<'_>,
         (rays, budget): (u32, &ErrorBudget),
         range: Range<usize>,
         out: &mut [f64],
@@ -299,7 +303,7 @@ impl Work<'_> {
         }
         let rays = rays.clamp(FEWEST_RAYS, PROBE_RAYS_MOST);
         let many = most_elements(scene.facets(), budget.solution) as f64;
-        let mut probe = Probe { scene, bvh, facing, rays, negligible: 0.0, traced: 0 };
+        let mut probe = Probe { scene, bvh, plane_sides, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
             let expected = core::mem::take(value);
             let facet = node.facet as usize;
@@ -327,7 +331,7 @@ impl Work<'_> {
 struct Probe<'a> {
     scene: &'a Scene<'a>,
     bvh: &'a Bvh<'a>,
-    facing: &'a Facing<'a>,
+    plane_sides: &'a PlaneSides<'a>,
     rays: u32,
     /// An unevenness that need not be known better.
     negligible: f64,
@@ -428,8 +432,8 @@ impl Probe<'_> {
         let corners = Path(node.path).corners(&self.scene.corners().at(facet));
         let receiver = Receiver { facet, side, normal, corners };
         let mut proven = [0; SIDE_SET_WORDS];
-        let mut clear = Clear::new(&mut proven);
-        if !clear.prove_whole(self.scene, self.facing, &receiver, PROBE_CLOSED_FORMS_MOST) {
+        let mut clear = ProvenVisible::new(&mut proven);
+        if !clear.prove_whole(self.scene, self.plane_sides, &receiver, PROBE_CLOSED_FORMS_MOST) {
             return None;
         }
         Some(self.closed_residuals(&receiver, &clear, points))
@@ -438,12 +442,17 @@ impl Probe<'_> {
     /// The same of a triangle for which all that is clear is known.
     // apart: its sums do not burden the stack of the proof
     #[inline(never)]
-    fn closed_residuals(&self, receiver: &Receiver, clear: &Clear<'_>, points: &[Vec3; PROBE_POINTS]) -> f64 {
+    fn closed_residuals(
+        &self,
+        receiver: &Receiver,
+        clear: &ProvenVisible<'_>,
+        points: &[Vec3; PROBE_POINTS],
+    ) -> f64 {
         let Receiver { facet, side, normal, .. } = *receiver;
         let mut sums = [1.0; PROBE_POINTS];
         let mut together =
             Together { block: TriangleBlock::EMPTY, brightness: [0.0; TRIANGLE_LANES], count: 0 };
-        for other in self.facing.before(facet, side) {
+        for other in self.plane_sides.before(facet, side) {
             let (triangle, sides) = (self.scene.corners().at(other), self.scene.sides());
             for other_side in (0..sides).filter(|&s| clear.has(other, s, sides)) {
                 let surface = Surface::new(self.scene, other, other_side, 1.0 / 3.0, 1.0 / 3.0);
@@ -477,7 +486,7 @@ impl Probe<'_> {
         backs: &mut [u32; PROBE_POINTS],
     ) {
         let mut ahead = AnswerBuffer::default();
-        let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.leave(direction);
+        let any = |n: u32| Surface { point: points.at(n as usize), ..*from }.spawn_ray(direction);
         for ((n, sum), backs) in (0..PROBE_POINTS as u32).zip(sums).zip(backs) {
             *sum += match self.bvh.closest_of(&mut ahead, n, PROBE_POINTS as u32, any) {
                 None => 1.0,

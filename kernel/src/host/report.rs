@@ -158,7 +158,7 @@ impl Report {
         let (mut skipped, mut open) = (0, 0);
         for (_, row) in coupling.rows(0..coupling.unknowns()) {
             self.pairs.sampled += row.targets.len() as u64;
-            self.certified.dropped = self.certified.dropped.max(row.row.lost);
+            self.certified.dropped = self.certified.dropped.max(row.row.truncated_weight);
             skipped += u64::from(row.row.state == ABSENT);
             open += u64::from(row.row.state == OPEN);
         }

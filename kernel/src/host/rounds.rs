@@ -50,7 +50,7 @@ impl Rounds {
     /// Rounds of an image whose error is to be `tolerance`.
     pub fn new(tolerance: f64) -> Rounds {
         let (seconds, rays) = (Seconds::default(), Rays::default());
-        let first = rounds::first(tolerance);
+        let first = rounds::first_tolerance(tolerance);
         Rounds { asked: tolerance, tolerance: first, done: 0, last: None, seconds, rays }
     }
 
@@ -69,7 +69,7 @@ impl Rounds {
         report.tolerance = self.asked;
         report.tolerance_met = report.error_estimate <= self.asked;
         (report.seconds, report.rays, report.rounds) = (self.seconds, self.rays, self.done);
-        let next = rounds::again(self.asked, &round, self.last.as_ref(), self.done);
+        let next = rounds::next_tolerance(self.asked, &round, self.last.as_ref(), self.done);
         self.last = Some(round);
         self.tolerance = next.unwrap_or(self.tolerance);
         next.is_some()

@@ -33,7 +33,7 @@ impl Gatherer<'_> {
 }
 
 impl Sink for Gatherer<'_> {
-    fn meet(&mut self, hit: &Hit, leg: &PathState) {
+    fn meet(&mut self, hit: &Hit, state: &PathState) {
         if self.light.sun.is_none() {
             return;
         }
@@ -41,18 +41,18 @@ impl Sink for Gatherer<'_> {
         let diffuse = self.scene.diffuse(p.material);
         if diffuse > 0.0 {
             let lit = self.light.sunlit(self.scene, hit.point, hit.normal, hit.primitive);
-            self.add(leg.depth + 1, leg.throughput * diffuse * lit);
+            self.add(state.depth + 1, state.throughput * diffuse * lit);
         }
     }
 
-    fn escape(&mut self, leg: &PathState) {
+    fn escape(&mut self, state: &PathState) {
         if !self.closed {
-            self.add(leg.depth, leg.throughput * self.light.radiance(leg.direction, leg.depth > 0));
+            self.add(state.depth, state.throughput * self.light.radiance(state.direction, state.depth > 0));
         }
     }
 
-    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, leg: &PathState) {
-        self.add(leg.depth, leg.throughput * self.light.in_lobe(self.scene, hit, mirrored, lobe));
+    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, state: &PathState) {
+        self.add(state.depth, state.throughput * self.light.in_lobe(self.scene, hit, mirrored, lobe));
     }
 }
 

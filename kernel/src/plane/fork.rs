@@ -20,7 +20,7 @@ plain_struct! {
         pub normal: [f64; 2],
         /// Its middle, the mirror direction.
         pub direction: [f64; 2],
-        /// [`PathState::through`] and [`PathState::floor`] of what it reflects.
+        /// [`PathState::throughput`] and [`PathState::floor`] of what it reflects.
         pub throughput: f64,
         /// See `through`.
         pub floor: f64,
@@ -68,29 +68,29 @@ const GRADED: u32 = 2;
 const PAPER: u32 = 3;
 
 impl Fork {
-    /// The lobe around `leg.direction` that is met at `hit`, `leg.lobes` counting it. `sweep` finds the spans that a split
+    /// The lobe around `state.direction` that is met at `hit`, `state.lobes` counting it. `sweep` finds the spans that a split
     /// lobe sees, and their number, where there is memory for them.
     pub(super) fn new(
         scene: &PlaneScene<'_>,
         hit: &Hit,
-        leg: &PathState,
+        state: &PathState,
         material: u32,
         sweep: impl FnOnce() -> Option<usize>,
     ) -> Option<Fork> {
         let (lobe, rays) = scene.lobe(material)?;
-        let visible = lobe.visible(leg.direction, hit.normal);
+        let visible = lobe.visible(state.direction, hit.normal);
         let mut fork = Fork {
             point: hit.point.to_array(),
             normal: hit.normal.to_array(),
-            direction: leg.direction.to_array(),
-            throughput: leg.throughput,
-            floor: leg.floor,
+            direction: state.direction.to_array(),
+            throughput: state.throughput,
+            floor: state.floor,
             visible: [visible.low, visible.high],
             part: [visible.low, visible.high],
             primitive: hit.primitive,
             material,
-            depth: leg.depth,
-            lobes: leg.lobes,
+            depth: state.depth,
+            lobes: state.lobes,
             ..Fork::default()
         };
         match rays {
@@ -127,7 +127,7 @@ impl Fork {
     /// A ray that carries the share `share` of the lobe's energy. At a path's first two lobes the chain's floor shrinks with
     /// the share: what the reflectances leave decides where it ends, not into how many rays a lobe is split. Beyond, small
     /// shares end, so that trees that branch at every lobe are finite.
-    fn leg(&self, direction: Vec2, share: f64) -> PathState {
+    fn state(&self, direction: Vec2, share: f64) -> PathState {
         let floor = if self.lobes <= 2 { self.floor * share } else { self.floor };
         PathState {
             origin: Vec2::from(self.point),
@@ -157,7 +157,7 @@ impl Fork {
             if self.kind == PAPER {
                 let (ray, weight) = self.paper_ray(lobe, number);
                 if ray.dot(Vec2::from(self.normal)) > 0.0 {
-                    return Some(self.leg(ray, weight * self.sum));
+                    return Some(self.state(ray, weight * self.sum));
                 }
                 continue;
             }
@@ -177,7 +177,7 @@ impl Fork {
                     (x, 0.5 * width * w)
                 }
             };
-            let ray = self.leg(lobe.direction(Vec2::from(self.direction), low + width * x), share);
+            let ray = self.state(lobe.direction(Vec2::from(self.direction), low + width * x), share);
             if self.sky == 0 {
                 return Some(ray);
             }

@@ -101,15 +101,15 @@ struct Eye<'a> {
 }
 
 impl Sink for Eye<'_> {
-    fn meet(&mut self, hit: &Hit, leg: &PathState) {
+    fn meet(&mut self, hit: &Hit, state: &PathState) {
         self.seen.rays += 1;
         self.seen.object = true;
         let solved = self.solved;
         let Some(p) = solved.scene.primitives().get(hit.primitive as usize) else { return };
         let diffuse = solved.scene.diffuse(p.material);
         let level = match solved.max_bounces {
-            Some(most) if leg.depth >= most => return,
-            Some(most) if most > 1 => (most - leg.depth - 1) as usize,
+            Some(most) if state.depth >= most => return,
+            Some(most) if most > 1 => (most - state.depth - 1) as usize,
             _ => 0,
         };
         if diffuse == 0.0 {
@@ -121,7 +121,7 @@ impl Sink for Eye<'_> {
         let stencil = solved.scene.stencil(hit.primitive as usize, v);
         let smooth: f64 = stencil.terms().map(|(u, w)| w * values.get(u).copied().unwrap_or(0.0)).sum();
         let sun = diffuse * solved.light.sunlit(solved.scene, hit.point, hit.normal, hit.primitive);
-        self.seen.radiance += leg.throughput * (smooth + sun);
+        self.seen.radiance += state.throughput * (smooth + sun);
     }
 
     fn back(&mut self) {
@@ -129,14 +129,14 @@ impl Sink for Eye<'_> {
         self.seen.object = true;
     }
 
-    fn escape(&mut self, leg: &PathState) {
+    fn escape(&mut self, state: &PathState) {
         self.seen.rays += 1;
-        self.seen.radiance += leg.throughput * self.solved.light.radiance(leg.direction, leg.depth > 0);
+        self.seen.radiance += state.throughput * self.solved.light.radiance(state.direction, state.depth > 0);
     }
 
-    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, leg: &PathState) {
+    fn glossy(&mut self, hit: &Hit, mirrored: Vec2, lobe: &PlaneLobe, state: &PathState) {
         let solved = self.solved;
-        self.seen.radiance += leg.throughput * solved.light.in_lobe(solved.scene, hit, mirrored, lobe);
+        self.seen.radiance += state.throughput * solved.light.in_lobe(solved.scene, hit, mirrored, lobe);
     }
 
     fn lost(&mut self, throughput: f64) {
@@ -155,8 +155,8 @@ impl Solved<'_> {
             cuts: self.light.cuts(),
         };
         let (skip, floor) = (NOWHERE, self.cutoff.max(1e-15));
-        let leg = PathState { origin, direction, skip, throughput: 1.0, floor, depth: 0, lobes: 0 };
-        chains.follow(leg, &mut eye, scratch);
+        let state = PathState { origin, direction, skip, throughput: 1.0, floor, depth: 0, lobes: 0 };
+        chains.follow(state, &mut eye, scratch);
         eye.seen
     }
 }

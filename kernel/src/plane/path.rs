@@ -36,10 +36,10 @@ pub(crate) struct PathState {
 
 /// Receiver of a chain's events: what it meets and where it leaves.
 pub(crate) trait Sink {
-    /// The front of a primitive is met after `leg.depth` mirrors.
-    fn meet(&mut self, hit: &Hit, leg: &PathState);
+    /// The front of a primitive is met after `state.depth` mirrors.
+    fn meet(&mut self, hit: &Hit, state: &PathState);
     /// The chain leaves the object.
-    fn escape(&mut self, leg: &PathState);
+    fn escape(&mut self, state: &PathState);
     /// A black back is met.
     fn back(&mut self) {}
     /// A lobe is met, around the direction `mirrored`; `through` includes its reflectance.

@@ -98,23 +98,23 @@ struct Row<'a> {
 }
 
 impl Sink for Row<'_> {
-    fn meet(&mut self, hit: &Hit, leg: &PathState) {
+    fn meet(&mut self, hit: &Hit, state: &PathState) {
         let unknowns = self.scene.unknowns();
         self.info.rays += 1;
         self.info.coupled = 1;
-        let Some(class) = class(leg.depth, self.settings) else { return };
+        let Some(class) = class(state.depth, self.settings) else { return };
         let Some(part) = self.matrix.get_mut(class * unknowns..(class + 1) * unknowns) else { return };
         let v = self.scene.parameter(hit.primitive as usize, hit.point);
         for (unknown, weight) in self.scene.stencil(hit.primitive as usize, v).terms() {
             if let Some(entry) = part.get_mut(unknown) {
-                *entry += leg.throughput * weight;
+                *entry += state.throughput * weight;
             }
         }
     }
 
-    fn escape(&mut self, leg: &PathState) {
-        if let Some(open) = class(leg.depth, self.settings).and_then(|c| self.open.get_mut(c)) {
-            *open += leg.throughput;
+    fn escape(&mut self, state: &PathState) {
+        if let Some(open) = class(state.depth, self.settings).and_then(|c| self.open.get_mut(c)) {
+            *open += state.throughput;
         }
     }
 
@@ -212,7 +212,7 @@ pub(crate) fn gather<S: Sink>(job: &Gather<'_>, unknown: usize, sink: &mut S, sc
 }
 
 impl Station<'_> {
-    fn leg(&self, s: f64, weight: f64) -> PathState {
+    fn state(&self, s: f64, weight: f64) -> PathState {
         PathState {
             origin: self.point,
             direction: toward(self.normal, s),
@@ -228,7 +228,7 @@ impl Station<'_> {
     fn sky<S: Sink>(&self, span: &Span, sink: &mut S) {
         let width = span.to - span.from;
         nodes(self.chains.sky_nodes, |x, w| {
-            sink.escape(&self.leg(span.from + width * x, 0.5 * width * w));
+            sink.escape(&self.state(span.from + width * x, 0.5 * width * w));
         });
     }
 
@@ -260,9 +260,11 @@ impl Station<'_> {
                 self.element(index, centre / count, weight, sink);
                 for i in 0..chains {
                     let part = (f64::from(i) + 0.5) / f64::from(chains);
-                    let leg = self.leg(from + (to - from) * part, weight / f64::from(chains));
-                    if let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip).filter(|h| h.front) {
-                        self.chains.reflect(&hit, leg, sink, scratch);
+                    let state = self.state(from + (to - from) * part, weight / f64::from(chains));
+                    if let Some(hit) =
+                        scene.first(state.origin, state.direction, state.skip).filter(|h| h.front)
+                    {
+                        self.chains.reflect(&hit, state, sink, scratch);
                     }
                 }
             }
@@ -282,7 +284,7 @@ impl Station<'_> {
             || place.normal.dot(away) < 0.0;
         if facing {
             let hit = Hit { primitive: index as u32, point: place.point, normal: place.normal, front: true };
-            sink.meet(&hit, &self.leg(0.0, weight));
+            sink.meet(&hit, &self.state(0.0, weight));
         }
     }
 
@@ -311,7 +313,9 @@ impl Station<'_> {
                 w if w > 1e-5 => points.min(2),
                 _ => 1,
             };
-            graded(n, |x, w| self.chains.follow(self.leg(from + width * x, 0.5 * width * w), sink, scratch));
+            graded(n, |x, w| {
+                self.chains.follow(self.state(from + width * x, 0.5 * width * w), sink, scratch)
+            });
             from = to;
         };
         if self.chains.scene.mirrors() || self.light.is_some_and(|l| l.sun().is_some()) {
@@ -357,18 +361,18 @@ impl Station<'_> {
     /// and where it escapes; mirrors that bring less than the root of the cutoff do not count.
     fn signature(&self, s: f64) -> u64 {
         let scene = self.chains.scene;
-        let mut leg = self.leg(s, 1.0);
+        let mut state = self.state(s, 1.0);
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut mix = |value: u64| hash = (hash ^ value).wrapping_mul(0x0000_0100_0000_01b3);
         let sun = self.light.filter(|l| l.sun().is_some());
         let mut normal = self.normal;
         let faintest = sqrt(self.cutoff);
-        while leg.throughput > faintest && leg.depth <= self.chains.most.min(LONGEST_TOLD_APART) {
-            let Some(hit) = scene.first(leg.origin, leg.direction, leg.skip) else {
+        while state.throughput > faintest && state.depth <= self.chains.most.min(LONGEST_TOLD_APART) {
+            let Some(hit) = scene.first(state.origin, state.direction, state.skip) else {
                 // chains that escape to either side of a trapped one
-                mix(u64::from(cross(normal, leg.direction) > 0.0));
+                mix(u64::from(cross(normal, state.direction) > 0.0));
                 for (i, cut) in self.chains.cuts.iter().enumerate() {
-                    mix((i as u64) << 1 | u64::from(cross(*cut, leg.direction) > 0.0));
+                    mix((i as u64) << 1 | u64::from(cross(*cut, state.direction) > 0.0));
                 }
                 break;
             };
@@ -381,11 +385,16 @@ impl Station<'_> {
                 break;
             }
             normal = hit.normal;
-            let mirrored = scene.mirrored(&hit, leg.direction);
-            let throughput = leg.throughput * scene.specular(p.material);
-            leg =
-                PathState { origin: hit.point, direction: mirrored, skip: hit.primitive, throughput, ..leg };
-            leg.depth += 1;
+            let mirrored = scene.mirrored(&hit, state.direction);
+            let throughput = state.throughput * scene.specular(p.material);
+            state = PathState {
+                origin: hit.point,
+                direction: mirrored,
+                skip: hit.primitive,
+                throughput,
+                ..state
+            };
+            state.depth += 1;
         }
         hash
     }

@@ -88,14 +88,14 @@ impl PlaneScene<'_> {
 const PLANE_CHAIN_MOST: u32 = 100_000;
 impl Chains<'_> {
     /// Follows a ray and all that its reflections make of it.
-    pub fn follow<S: Sink>(&self, leg: PathState, sink: &mut S, scratch: &mut Scratch<'_>) {
-        self.go_on(Some(leg), 0, sink, scratch);
+    pub fn follow<S: Sink>(&self, state: PathState, sink: &mut S, scratch: &mut Scratch<'_>) {
+        self.go_on(Some(state), 0, sink, scratch);
     }
 
     /// Follows all that the reflection of a ray at a hit makes of it.
-    pub fn reflect<S: Sink>(&self, hit: &Hit, leg: PathState, sink: &mut S, scratch: &mut Scratch<'_>) {
+    pub fn reflect<S: Sink>(&self, hit: &Hit, state: PathState, sink: &mut S, scratch: &mut Scratch<'_>) {
         let mut forks = 0;
-        let next = self.reflected(hit, leg, &mut forks, sink, scratch);
+        let next = self.reflected(hit, state, &mut forks, sink, scratch);
         self.go_on(next, forks, sink, scratch);
     }
 
@@ -109,8 +109,8 @@ impl Chains<'_> {
         scratch: &mut Scratch<'_>,
     ) {
         loop {
-            while let Some(leg) = next {
-                next = self.step(leg, &mut forks, sink, scratch);
+            while let Some(state) = next {
+                next = self.step(state, &mut forks, sink, scratch);
             }
             next = self.resume(&mut forks, sink, scratch);
             if next.is_none() {
@@ -123,21 +123,21 @@ impl Chains<'_> {
     #[inline(always)]
     fn step<S: Sink>(
         &self,
-        leg: PathState,
+        state: PathState,
         forks: &mut usize,
         sink: &mut S,
         scratch: &mut Scratch<'_>,
     ) -> Option<PathState> {
-        let Some(hit) = self.scene.first(leg.origin, leg.direction, leg.skip) else {
-            sink.escape(&leg);
+        let Some(hit) = self.scene.first(state.origin, state.direction, state.skip) else {
+            sink.escape(&state);
             return None;
         };
         if !hit.front {
             sink.back();
             return None;
         }
-        sink.meet(&hit, &leg);
-        self.reflected(&hit, leg, forks, sink, scratch)
+        sink.meet(&hit, &state);
+        self.reflected(&hit, state, forks, sink, scratch)
     }
 
     /// The next ray of the lobes under way, those met last first.
@@ -149,8 +149,8 @@ impl Chains<'_> {
     ) -> Option<PathState> {
         while let Some(last) = forks.checked_sub(1) {
             let (fork, spans) = scratch.under_way(last)?;
-            if let Some(leg) = fork.next(self, spans, sink) {
-                return Some(leg);
+            if let Some(state) = fork.next(self, spans, sink) {
+                return Some(state);
             }
             scratch.leave(last);
             *forks = last;
@@ -162,28 +162,28 @@ impl Chains<'_> {
     fn reflected<S: Sink>(
         &self,
         hit: &Hit,
-        leg: PathState,
+        state: PathState,
         forks: &mut usize,
         sink: &mut S,
         scratch: &mut Scratch<'_>,
     ) -> Option<PathState> {
         let material = self.scene.primitives().get(hit.primitive as usize)?.material;
-        let throughput = leg.throughput * self.scene.specular(material);
-        if throughput == 0.0 || leg.depth >= self.most {
+        let throughput = state.throughput * self.scene.specular(material);
+        if throughput == 0.0 || state.depth >= self.most {
             return None;
         }
-        if throughput < leg.floor || leg.depth >= PLANE_CHAIN_MOST || leg.lobes >= MOST_LOBES {
+        if throughput < state.floor || state.depth >= PLANE_CHAIN_MOST || state.lobes >= MOST_LOBES {
             sink.lost(throughput);
             return None;
         }
-        let direction = self.scene.mirrored(hit, leg.direction);
-        let (origin, skip, depth) = (hit.point, hit.primitive, leg.depth + 1);
-        let next = PathState { origin, direction, skip, throughput, depth, ..leg };
+        let direction = self.scene.mirrored(hit, state.direction);
+        let (origin, skip, depth) = (hit.point, hit.primitive, state.depth + 1);
+        let next = PathState { origin, direction, skip, throughput, depth, ..state };
         match self.scene.lobe(material) {
             None => Some(next),
             Some((lobe, _)) => {
                 sink.glossy(hit, direction, lobe, &next);
-                let next = PathState { lobes: leg.lobes + 1, ..next };
+                let next = PathState { lobes: state.lobes + 1, ..next };
                 let sweep = || scratch.nested(self.scene, hit.point, hit.normal, hit.primitive, self.cuts);
                 let fork = Fork::new(self.scene, hit, &next, material, sweep)?;
                 scratch.enter(forks, fork);

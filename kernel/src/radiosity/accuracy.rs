@@ -13,7 +13,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces, span};
 use crate::base::math::{fabs, narrow};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
-use crate::coupling::word::STRAIGHT;
+use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::radiosity::System;
 use crate::scene::sky::Sky;
@@ -31,13 +31,13 @@ const DEPARTURE: f64 = 2.0;
 /// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
 pub const ROW_UNSEEN_RAYS: f64 = 0.5;
 
-/// The most products of [`carry`]: in a room of albedo 0.85 a seventh is left out.
+/// The most products of [`propagate`]: in a room of albedo 0.85 a seventh is left out.
 const MOST_CARRIED: u32 = 12;
 
-/// What the products of [`carry`] leave out, where so few leave out so little.
+/// What the products of [`propagate`] leave out, where so few leave out so little.
 const LEFT_OUT: f64 = 5e-3;
 
-/// How often [`carry`] is called, and the products that it and [`rows`] make: each brings at most q of
+/// How often [`propagate`] is called, and the products that it and [`rows`] make: each brings at most q of
 /// what the one before did, q the largest diffuse reflectance and what mirrors add to it.
 pub fn carried(scene: &Scene<'_>) -> u32 {
     let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
@@ -88,9 +88,9 @@ impl LaneTask for Differences<'_, '_> {
         let Differences { system, radiance, reference, range, out } = self;
         let bands = system.shape.bands.clamp(1, MAX_BANDS);
         // one by one: a pair of them would be made elsewhere on the stack and copied
-        let mut checks = [[0.0; 4]; MAX_BANDS];
+        let mut half_differences = [[0.0; 4]; MAX_BANDS];
         let mut light = [0.0; MAX_BANDS];
-        let (sums, light) = (checks.head_mut(bands), light.head_mut(bands));
+        let (sums, light) = (half_differences.head_mut(bands), light.head_mut(bands));
         for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
             sums.fill([0.0; 4]);
             add_targets(&row, radiance, sums);
@@ -116,7 +116,7 @@ impl LaneTask for Differences<'_, '_> {
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
-pub fn carry(
+pub fn propagate(
     system: &System<'_>,
     differences: &[Own],
     from: &[f32],
@@ -142,7 +142,7 @@ pub fn carry(
 
 /// Expected squared error of the irradiance over pi of each unknown in `range`, relative to the reference radiance, in
 /// the band where it is largest: where noise is all there is, up to three times that. From the [`differences`] of all
-/// unknowns and what [`carry`] came to. An element inside a body has its stand-in's.
+/// unknowns and what [`propagate`] came to. An element inside a body has its stand-in's.
 ///
 /// # Errors
 /// [`Error::Length`] for an output of another length.
@@ -159,7 +159,7 @@ pub fn rows(
     let sums = sums.head_mut(bands);
     let unseen = if is_dark(system) { 0.0 } else { ROW_UNSEEN_RAYS };
     for ((unknown, row), out) in system.coupling.rows(range).zip(out) {
-        let near = system.stand_in(unknown, &row);
+        let near = system.substitute_row(unknown, &row);
         let known = near.and_then(|near| system.coupling.rows(near..near + 1).next());
         let (unknown, row) = known.unwrap_or((unknown, row));
         row.gather(carried, sums);
@@ -199,10 +199,10 @@ fn about_mean<L: Lanes>(
     sums: &mut [[f64; 4]],
 ) {
     let bands = sums.len();
-    let (mut met, mut checks) = (0.0, [0.0; 4]);
-    for record in row.targets.iter().filter(|record| record.word() == STRAIGHT) {
+    let (mut met, mut half_differences) = (0.0, [0.0; 4]);
+    for record in row.targets.iter().filter(|record| record.path() == STRAIGHT) {
         met += record.weight;
-        checks.iter_mut().zip(record.checks).for_each(|(sum, c)| *sum += f64::from(c));
+        half_differences.iter_mut().zip(record.half_differences).for_each(|(sum, c)| *sum += f64::from(c));
     }
     if met <= 0.0 || fabs(met - row.row.blocked) > ONE_EACH {
         return;
@@ -210,23 +210,23 @@ fn about_mean<L: Lanes>(
     let mut means = [0.0; MAX_BANDS];
     row.gather(radiance, means.head_mut(bands));
     if let Some(sky) = &system.light.sky {
-        for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.word, BLOCKED | STRAIGHT)) {
+        for bundle in row.escapes.into_iter().filter(|bundle| !matches!(bundle.path, BLOCKED | STRAIGHT)) {
             sky.sum(lanes, bundle.packed, light);
-            let seen = light.iter().zip(row.products(bundle.word));
+            let seen = light.iter().zip(row.products(bundle.path));
             means.iter_mut().zip(seen).for_each(|(mean, (l, p))| *mean += bundle.weight * l * p);
         }
     }
     let scale = system.straight.scale(unknown, bands, &row.row);
     for (sums, mean) in sums.iter_mut().zip(means) {
-        sums.iter_mut().zip(checks).for_each(|(sum, c)| *sum = scale * (*sum - mean / met * c));
+        sums.iter_mut().zip(half_differences).for_each(|(sum, c)| *sum = scale * (*sum - mean / met * c));
     }
 }
 
 /// Adds a row's checks, each times the light it stands for, by band.
 #[inline(always)]
-fn add(sums: &mut [[f64; 4]], checks: [f32; 4], lights: impl Iterator<Item = f64>) {
+fn add(sums: &mut [[f64; 4]], half_differences: [f32; 4], lights: impl Iterator<Item = f64>) {
     for (sum, light) in sums.iter_mut().zip(lights) {
-        sum.iter_mut().zip(checks).for_each(|(s, c)| *s += light * f64::from(c));
+        sum.iter_mut().zip(half_differences).for_each(|(s, c)| *s += light * f64::from(c));
     }
 }
 
@@ -236,7 +236,7 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
     for record in row.targets {
         let start = record.unknown() * bands;
         let seen = radiance.part(start..start + bands);
-        add(sums, record.checks, seen.iter().zip(row.products(record.word())).map(|(l, p)| l * p));
+        add(sums, record.half_differences, seen.iter().zip(row.products(record.path())).map(|(l, p)| l * p));
     }
 }
 
@@ -250,14 +250,14 @@ fn add_sky<L: Lanes>(
     sums: &mut [[f64; 4]],
 ) {
     for bundle in row.escapes {
-        if known && matches!(bundle.word, BLOCKED | STRAIGHT) {
+        if known && matches!(bundle.path, BLOCKED | STRAIGHT) {
             continue;
         }
         sky.sum(lanes, bundle.packed, light);
-        match bundle.word {
+        match bundle.path {
             BLOCKED if row.row.state != ENCLOSED => light.iter_mut().for_each(|l| *l = -*l),
-            word => light.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= product),
+            path => light.iter_mut().zip(row.products(path)).for_each(|(l, product)| *l *= product),
         }
-        add(sums, bundle.checks, light.iter().copied());
+        add(sums, bundle.half_differences, light.iter().copied());
     }
 }

@@ -12,12 +12,12 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, clamp, reflect};
 use crate::base::qmc::{Sequence, hash2, triangle};
 use crate::coupling::element::Elements;
+use crate::coupling::mirror_path::STRAIGHT;
+use crate::coupling::row_builder::RowBuilder;
 use crate::coupling::rows::lobe_point;
-use crate::coupling::sink::Sink;
-use crate::coupling::word::STRAIGHT;
 use crate::coupling::{Coupling, Record, Row, TRACED};
-use crate::radiosity::direct::Shape;
-use crate::radiosity::sun_image::{Noting, pack};
+use crate::radiosity::direct::TableShape;
+use crate::radiosity::sun_image::{SunImagesMut, pack};
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
@@ -83,16 +83,16 @@ pub fn fill(
     memory: &mut [u8],
 ) -> Result<usize, Error> {
     let given = memory.len();
-    let sink = Sink::new(&range, scene.bands(), false, memory)?;
+    let builder = RowBuilder::new(&range, scene.bands(), false, memory)?;
     let wanted = range.len();
-    let mut tracer = Tracer { scene, bvh, elements, sun, settings, sink };
+    let mut tracer = Tracer { scene, bvh, elements, sun, settings, builder };
     for row in range {
         if tracer.row(row).is_none() {
-            tracer.sink.drop_row();
+            tracer.builder.drop_row();
             break;
         }
     }
-    match tracer.sink.end() {
+    match tracer.builder.end() {
         0 if wanted > 0 => Err(Error::BufferTooSmall { needed: given.saturating_mul(2), given }),
         done => Ok(done),
     }
@@ -104,7 +104,7 @@ struct Tracer<'a, 'm> {
     elements: &'a Elements<'a>,
     sun: &'a Sun<'a>,
     settings: &'a BeamSettings,
-    sink: Sink<'m>,
+    builder: RowBuilder<'m>,
 }
 
 impl Tracer<'_, '_> {
@@ -112,7 +112,7 @@ impl Tracer<'_, '_> {
         let (facet, side) = (row / self.scene.sides().max(1), row % self.scene.sides().max(1));
         let area = seen_area(self.scene, self.sun, facet, side);
         if area <= 0.0 {
-            self.sink.end_row(Row::default(), Some, Record::join_beam);
+            self.builder.end_row(Row::default(), Some, Record::join_beam);
             return Some(());
         }
         let wanted = clamp(area * self.settings.density, FACET_BEAM_RAYS.0, FACET_BEAM_RAYS.1);
@@ -131,13 +131,13 @@ impl Tracer<'_, '_> {
                     &mut stats,
                 )?;
             }
-            if self.sink.present() >= fold {
-                fold = FOLD.max(2 * self.sink.fold(Record::join_beam));
+            if self.builder.present() >= fold {
+                fold = FOLD.max(2 * self.builder.merge_duplicates(Record::join_beam));
             }
         }
         let share = 1.0 / f64::from(rays);
         let finish = |record: Record| Some(record.scaled_beam(share));
-        self.sink.end_row(stats, finish, Record::join_beam);
+        self.builder.end_row(stats, finish, Record::join_beam);
         Some(())
     }
 
@@ -162,11 +162,11 @@ impl Tracer<'_, '_> {
             let toward = self.sun.sample(s, t);
             if toward.dot(surface.normal) > 0.0 {
                 // flux per unit of normal irradiance, the first cosine still to come
-                let (flux, word, arrival) = (scene.areas().at(facet), STRAIGHT, None);
+                let (flux, path, arrival) = (scene.areas().at(facet), STRAIGHT, None);
                 let axis = Some(-self.sun.direction());
                 let chain =
-                    Chain { index, surface, mirror: facet, direction: -toward, flux, word, arrival, axis };
-                rays.set(count, surface.leave(toward));
+                    Chain { index, surface, mirror: facet, direction: -toward, flux, path, arrival, axis };
+                rays.set(count, surface.spawn_ray(toward));
                 chains.set(count, Some(chain));
                 count += 1;
             }
@@ -207,27 +207,27 @@ impl Tracer<'_, '_> {
     fn mirrored(&mut self, chain: &mut Chain, sequence: &Sequence) -> Option<Option<Ray>> {
         let (scene, surface) = (self.scene, chain.surface);
         let Some(mirror) = surface.mirror(scene) else { return Some(None) };
-        let depth = self.sink.words.get(chain.word).depth;
+        let depth = self.builder.paths.get(chain.path).depth;
         if depth >= self.settings.mirrors {
             return Some(None);
         }
-        chain.word = match self.sink.spell(chain.word, mirror.class, scene) {
+        chain.path = match self.builder.extend_path(chain.path, mirror.class, scene) {
             Ok(next) => next,
             Err(true) => return Some(None),
             Err(false) => return None,
         };
-        if self.sink.words.largest(chain.word) < self.settings.cutoff {
+        if self.builder.paths.largest(chain.path) < self.settings.cutoff {
             return Some(None);
         }
         let lobe = mirror.lobe.is_some();
         chain.mirror = surface.facet;
         chain.axis = chain.axis.zip(surface.flat_mirror(scene)).map(|(axis, normal)| reflect(axis, normal));
         let (s, t) = if lobe { lobe_point(sequence, chain.index, depth) } else { (0.0, 0.0) };
-        let (leaving, share) = surface.go_on(scene, &mirror, chain.direction, s, t);
+        let (leaving, share) = surface.sample_reflection(scene, &mirror, chain.direction, s, t);
         let flat = !lobe && !scene.is_smooth();
         chain.flux *= share * turned(surface.normal, leaving, chain.arrival, flat);
         (chain.direction, chain.arrival) = (leaving, Some(leaving));
-        Some(Some(surface.leave(leaving)))
+        Some(Some(surface.spawn_ray(leaving)))
     }
 
     /// Notes what a chain brings to the surface that it has met.
@@ -237,7 +237,7 @@ impl Tracer<'_, '_> {
         let area = self.scene.areas().at(facet) * self.elements.share(target.0);
         let image = chain.axis.map_or(0, |axis| pack(-axis));
         let from = (image, if image == 0 { 0 } else { chain.mirror as u32 });
-        self.sink.push(Record::beam(target, chain.word, chain.flux / area, from))
+        self.builder.push(Record::beam(target, chain.path, chain.flux / area, from))
     }
 }
 
@@ -259,7 +259,7 @@ struct Chain {
     direction: Vec3,
     /// Per unit of the sun's normal irradiance.
     flux: f64,
-    word: u16,
+    path: u16,
     /// The direction in which it came from the mirror before.
     arrival: Option<Vec3>,
     /// The way of the light of the sun's middle, as long as flat mirrors turn it.
@@ -284,9 +284,9 @@ pub fn add(
     beams: &Coupling<'_>,
     (coupling, elements): (&Coupling<'_>, &Elements<'_>),
     sun: &Sun<'_>,
-    shape: Shape,
+    shape: TableShape,
     table: &mut [f64],
-    images: &mut Noting<'_>,
+    images: &mut SunImagesMut<'_>,
 ) {
     for (_, row) in beams.rows(0..beams.unknowns()) {
         for record in row.targets {
@@ -294,17 +294,17 @@ pub fn add(
             if image != 0 {
                 images.note(elements.facet_sides(), elements.facet_side(unknown), image, record.mirror());
             }
-            let exposed = f64::from(coupling.row(unknown).exposed);
-            if exposed == 0.0 {
+            let visible_share = f64::from(coupling.row(unknown).visible_share);
+            if visible_share == 0.0 {
                 continue;
             }
-            images.spread(unknown, record, exposed, |band| {
-                sun.irradiance(band) * row.products(record.word()).at(band)
+            images.spread(unknown, record, visible_share, |band| {
+                sun.irradiance(band) * row.products(record.path()).at(band)
             });
-            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.word()), l)) {
+            for level in (0..shape.levels).filter(|&l| shape.counts(row.depth(record.path()), l)) {
                 let Some(mean) = table.get_mut(shape.at(unknown, level)) else { continue };
-                for (band, (e, product)) in mean.iter_mut().zip(row.products(record.word())).enumerate() {
-                    let irradiance = sun.irradiance(band) * product * (record.weight / exposed);
+                for (band, (e, product)) in mean.iter_mut().zip(row.products(record.path())).enumerate() {
+                    let irradiance = sun.irradiance(band) * product * (record.weight / visible_share);
                     *e += irradiance;
                     if image != 0 {
                         images.add(shape, (unknown, level), band, irradiance);

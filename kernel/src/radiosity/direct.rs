@@ -9,7 +9,7 @@ use crate::base::math::{PI, Vec3};
 use crate::base::qmc::{Sequence, hash2, triangle};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
-use crate::coupling::word::STRAIGHT;
+use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
 use crate::radiosity::straight::{Blocked, Straight};
 use crate::rays::bvh::Bvh;
@@ -23,14 +23,14 @@ use core::ops::Range;
 /// Shape of the tables that hold irradiances: for each unknown, each level and each of mean and two gradients,
 /// one value per band. Level l counts light reflected at most l times; one level alone counts all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub struct TableShape {
     /// Levels: 1, or `max_bounces` + 1.
     pub levels: usize,
     /// Spectral bands.
     pub bands: usize,
 }
 
-impl Shape {
+impl TableShape {
     /// Values of one unknown.
     #[inline(always)]
     pub fn stride(self) -> usize {
@@ -72,7 +72,7 @@ pub fn sky_rows(
     (sky, straight): (&Sky<'_>, &Straight<'_>),
     relative_error: f64,
     range: Range<usize>,
-    shape: Shape,
+    shape: TableShape,
     out: &mut [f64],
 ) -> Result<(), Error> {
     let expected = span(&range) * shape.stride();
@@ -98,7 +98,7 @@ struct SkyRows<'a, 'o> {
     straight: &'a Straight<'a>,
     relative_error: f64,
     range: Range<usize>,
-    shape: Shape,
+    shape: TableShape,
     out: &'o mut [f64],
 }
 
@@ -144,22 +144,22 @@ fn add_escapes<L: Lanes>(
     row: &RowView<'_>,
     (sky, scale, blocked): (&Sky<'_>, Option<f64>, Option<Blocked>),
     lanes: L,
-    shape: Shape,
+    shape: TableShape,
     sum: &mut [f64],
     values: &mut [f64],
 ) {
     let bands = sum.len();
     for bundle in row.escapes {
-        if scale.is_some() && matches!(bundle.word, BLOCKED | STRAIGHT) {
+        if scale.is_some() && matches!(bundle.path, BLOCKED | STRAIGHT) {
             continue;
         }
         sky.sum(lanes, bundle.packed, sum);
         let pi = PI * scale.unwrap_or(1.0);
-        match bundle.word {
+        match bundle.path {
             BLOCKED => sum.iter_mut().for_each(|l| *l *= -PI),
-            word => sum.iter_mut().zip(row.products(word)).for_each(|(l, product)| *l *= pi * product),
+            path => sum.iter_mut().zip(row.products(path)).for_each(|(l, product)| *l *= pi * product),
         }
-        let depth = row.depth(bundle.word);
+        let depth = row.depth(bundle.path);
         let [mut a, mut b] = bundle.gradient.map(f64::from);
         if let Some(([whole, ..], short)) = blocked {
             // as much as it fills of what is blocked
@@ -221,7 +221,7 @@ pub fn sun_rows(
                 let (a, b) = triangle(p, q);
                 let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
                 let (s, t) = sequence.pair(n, 2);
-                let ray = Surface::new(scene, facet, side, u, v).leave(sun.sample(s, t));
+                let ray = Surface::new(scene, facet, side, u, v).spawn_ray(sun.sample(s, t));
                 let share = sun.share(ray.direction, normal);
                 if share > 0.0 {
                     toward.set(kept, ray);
@@ -241,15 +241,15 @@ pub fn sun_rows(
         }
         rays += u64::from(count);
         let share = if all > 0.0 { lit / all } else { 0.0 };
-        let exposed = f64::from(row.row.exposed);
+        let visible_share = f64::from(row.row.visible_share);
         // inside a body: what falls there matters to nothing
-        *value = if exposed > 0.0 { cosine * (share / exposed).min(1.0) } else { 0.0 };
+        *value = if visible_share > 0.0 { cosine * (share / visible_share).min(1.0) } else { 0.0 };
     }
     Ok(rays)
 }
 
 /// Adds irradiances (`bands` values an unknown) to the means in a table of one level.
-pub fn add(irradiance: &[f64], shape: Shape, table: &mut [f64]) {
+pub fn add(irradiance: &[f64], shape: TableShape, table: &mut [f64]) {
     for (unknown, to) in pieces(table, shape.stride()).enumerate() {
         let from = irradiance.part(unknown * shape.bands..(unknown + 1) * shape.bands);
         to.iter_mut().zip(from).for_each(|(to, from)| *to += from);

@@ -2,7 +2,7 @@
 
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 use crate::radiosity::straight::{self, Straight};
 use crate::radiosity::sun_image::SunImages;
 
@@ -10,7 +10,7 @@ use crate::radiosity::sun_image::SunImages;
 #[derive(Clone, Copy, Debug)]
 pub struct Solution<'m> {
     /// Shape of the irradiance table.
-    pub shape: Shape,
+    pub shape: TableShape,
     /// Reference radiance, one value per band.
     pub reference: &'m [f64],
     /// Mean and gradients of each unknown's irradiance, without the sun's direct part and that of its images.
@@ -72,8 +72,8 @@ pub struct SolutionMemory<'m> {
     pub sun: &'m mut [f64],
     /// As [`SunImages::slots`].
     pub slots: &'m mut [u64],
-    /// As [`SunImages::thrown`].
-    pub thrown: &'m mut [f64],
+    /// As [`SunImages::reflected_irradiance`].
+    pub reflected_irradiance: &'m mut [f64],
     /// As [`Solution::variance`].
     pub variance: &'m mut [f32],
 }
@@ -82,7 +82,7 @@ pub struct SolutionMemory<'m> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SolutionSize {
     /// Shape of the irradiance table.
-    pub shape: Shape,
+    pub shape: TableShape,
     /// Unknowns.
     pub unknowns: usize,
     /// Places for images of the sun; 0 where no mirror throws sunlight.
@@ -103,7 +103,7 @@ impl SolutionSize {
     }
 
     /// Irradiances by images of the sun.
-    pub fn thrown(&self) -> usize {
+    pub fn reflected_irradiance(&self) -> usize {
         if self.places > 0 { self.values() * self.shape.levels } else { 0 }
     }
 
@@ -122,7 +122,7 @@ impl SolutionSize {
             .and::<f32>(self.straight().1)
             .and::<f64>(self.unknowns)
             .and::<u64>(self.places)
-            .and::<f64>(self.thrown())
+            .and::<f64>(self.reflected_irradiance())
             .and::<f32>(self.unknowns)
     }
 
@@ -135,7 +135,7 @@ impl SolutionSize {
             straight_variance: arena.take(self.straight().1)?,
             sun: arena.take(self.unknowns)?,
             slots: arena.take(self.places)?,
-            thrown: arena.take(self.thrown())?,
+            reflected_irradiance: arena.take(self.reflected_irradiance())?,
             variance: arena.take(self.unknowns)?,
         })
     }

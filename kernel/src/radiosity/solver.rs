@@ -9,7 +9,7 @@
 //! **The bound.** For x' = G x + b with G >= 0 the distance of x' from the solution is at most
 //! q |x' - x| |(I - G)^-1|, in the largest norm. Where all rows of G sum to q < 1, the inverse is at most 1/(1 - q).
 //! Where some rows sum to 1, as in a white room with a window, any v >= 0 with (I - G) v >= 1 - d > 0 bounds it by
-//! max v/(1 - d); such a v is found by the same iteration with the source 1 ([`Solver::unit`]).
+//! max v/(1 - d); such a v is found by the same iteration with the source 1 ([`Solver::for_inverse_bound`]).
 
 use crate::base::error::Error;
 use crate::base::index::Index;
@@ -67,12 +67,12 @@ pub struct Solver {
     inverse: f64,
     goal: f64,
     most: u32,
-    pace: Option<Pace>,
+    acceleration: Option<Acceleration>,
 }
 
 /// Where the faster iteration stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Pace {
+struct Acceleration {
     /// Plain sweeps still to come before the next block.
     plain: u32,
     /// Sweeps of the block still to come, and their relaxation.
@@ -86,11 +86,11 @@ struct Pace {
     before: f64,
 }
 
-impl Pace {
-    fn new(q: f64) -> Pace {
+impl Acceleration {
+    fn new(q: f64) -> Acceleration {
         let plain = HISTORY_SOLUTIONS as u32 + 1;
         let interval = q.min(CHEBYSHEV_BLOCKS[0].1);
-        Pace { plain, left: 0, omega: 1.0, interval, block: 0, slow: false, before: f64::INFINITY }
+        Acceleration { plain, left: 0, omega: 1.0, interval, block: 0, slow: false, before: f64::INFINITY }
     }
 
     /// After a sweep that changed so much; false where going on brings nothing.
@@ -127,7 +127,7 @@ impl Pace {
 
 impl Solver {
     /// Before the first sweep of a system of contraction `q` (the largest over all rows). `inverse`: the bound that
-    /// [`Solver::unit`] found, where [`Solver::is_closed`] asks for it; `fast`: there is a [`History`].
+    /// [`Solver::for_inverse_bound`] found, where [`Solver::is_closed`] asks for it; `fast`: there is a [`History`].
     pub fn new(q: f64, inverse: Option<f64>, goal: f64, max_bounces: Option<u32>, fast: bool) -> Solver {
         let inverse = inverse.unwrap_or(1.0 / (1.0 - q).max(f64::MIN_POSITIVE));
         let needed = sweeps(q, goal);
@@ -138,46 +138,54 @@ impl Solver {
             None if fast => SWEEPS_MOST,
             None => needed.saturating_add(200).min(100_000),
         };
-        let pace = fast.then(|| Pace::new(q));
+        let acceleration = fast.then(|| Acceleration::new(q));
         let goal = if fast { FINER * goal } else { goal };
-        Solver { done: 0, error: f64::INFINITY, q, inverse, goal, most, pace }
+        Solver { done: 0, error: f64::INFINITY, q, inverse, goal, most, acceleration }
     }
 
     /// For the source 1, from 0: how the bound on the inverse is found. Ends where a sweep adds no more than 1/2
     /// anywhere.
-    pub fn unit() -> Solver {
-        let pace = Some(Pace::new(1.0));
-        Solver { done: 0, error: f64::INFINITY, q: 1.0, inverse: 1.0, goal: 0.5, most: SWEEPS_MOST, pace }
+    pub fn for_inverse_bound() -> Solver {
+        let acceleration = Some(Acceleration::new(1.0));
+        Solver {
+            done: 0,
+            error: f64::INFINITY,
+            q: 1.0,
+            inverse: 1.0,
+            goal: 0.5,
+            most: SWEEPS_MOST,
+            acceleration,
+        }
     }
 
-    /// True where a contraction bounds nothing, and [`Solver::unit`] has to.
+    /// True where a contraction bounds nothing, and [`Solver::for_inverse_bound`] has to.
     pub fn is_closed(q: f64, max_bounces: Option<u32>) -> bool {
         q >= CLOSED_ROW_SUM && max_bounces.is_none()
     }
 
     /// True where another sweep is wanted.
-    pub fn more(&self) -> bool {
+    pub fn is_unfinished(&self) -> bool {
         self.error > self.goal && self.done < self.most
     }
 
     /// Relaxation of the next sweep: the share of the step from the solution before last that is made.
     pub fn relaxation(&self) -> f64 {
-        self.pace.filter(|p| p.plain == 0).map_or(1.0, |p| p.omega)
+        self.acceleration.filter(|p| p.plain == 0).map_or(1.0, |p| p.omega)
     }
 
     /// Notes a sweep whose plain step would have changed the radiances by at most `change`; true where the sweep's
-    /// two solutions are to be handed to [`History::note`].
-    pub fn took(&mut self, change: f64) -> bool {
+    /// two solutions are to be handed to [`History::push`].
+    pub fn record_sweep(&mut self, change: f64) -> bool {
         self.done += 1;
         let plain = self.relaxation() == 1.0;
         let bound = if change == 0.0 { 0.0 } else { change * self.q * self.inverse };
         self.error = if plain { bound } else { f64::INFINITY };
-        let Some(pace) = &mut self.pace else { return false };
-        let noted = pace.plain > 0;
-        if !pace.step(self.q, change, bound <= 0.5 * self.goal) {
+        let Some(acceleration) = &mut self.acceleration else { return false };
+        let noted = acceleration.plain > 0;
+        if !acceleration.step(self.q, change, bound <= 0.5 * self.goal) {
             self.most = self.done;
         }
-        noted && self.more()
+        noted && self.is_unfinished()
     }
 
     /// After the last sweep: adds the rounding of the `radiance` itself; light of more reflections than count is no
@@ -195,7 +203,7 @@ impl Solver {
         self.error = self.error.max(MATRIX_ROUNDING * largest * self.inverse);
     }
 
-    /// The bound on the inverse from the end of [`Solver::unit`]: `solution` before the last sweep.
+    /// The bound on the inverse from the end of [`Solver::for_inverse_bound`]: `solution` before the last sweep.
     ///
     /// # Errors
     /// [`Error::Diverges`] where none was found; `row_sum` is what rows add up to.
@@ -214,22 +222,22 @@ impl Solver {
 #[derive(Debug)]
 pub struct History<'m> {
     /// What each row absorbs or lets out of a radiance of 1: the change that adding 1 everywhere makes up for.
-    deficits: &'m [f64],
+    row_deficits: &'m [f64],
     solutions: &'m mut [f64],
     filled: usize,
 }
 
 impl<'m> History<'m> {
     /// `memory` has room for [`kept`] solutions of `size` values each, the first of which holds the deficits
-    /// ([`crate::radiosity::System::deficits`]).
+    /// ([`crate::radiosity::System::row_deficits`]).
     pub fn new(memory: &'m mut [f64], size: usize) -> History<'m> {
-        let (deficits, solutions) = memory.split_at_mut(size.min(memory.len()));
-        History { deficits, solutions, filled: 0 }
+        let (row_deficits, solutions) = memory.split_at_mut(size.min(memory.len()));
+        History { row_deficits, solutions, filled: 0 }
     }
 
     /// Keeps `old`, or replaces `new`, which a plain sweep made of it, by what they all lead to in each of `bands`.
     /// `weight` of each value: the element's area over rho_d, so that sums are fluxes.
-    pub fn note(&mut self, old: &[f64], new: &mut [f64], bands: usize, weight: impl Fn(usize) -> f64) {
+    pub fn push(&mut self, old: &[f64], new: &mut [f64], bands: usize, weight: impl Fn(usize) -> f64) {
         let size = old.len();
         if self.solutions.len() < HISTORY_SOLUTIONS * size {
             return;
@@ -283,7 +291,7 @@ impl<'m> History<'m> {
             let d = changes(at, value);
             let weight = weight(at);
             left += weight * (d[0] - product(&steps(d)));
-            made_up += weight * self.deficits.at(at);
+            made_up += weight * self.row_deficits.at(at);
         }
         let level = if made_up > 0.0 { left / made_up } else { 0.0 };
         for (at, value) in new.iter_mut().enumerate().skip(band).step_by(bands.max(1)) {
@@ -346,7 +354,7 @@ mod tests {
         let mut memory = std::vec![0.0; (HISTORY_SOLUTIONS + 1) * n];
         memory.iter_mut().zip(g).for_each(|(d, row)| *d = 1.0 - row.iter().sum::<f64>());
         let mut history = History::new(&mut memory, n);
-        while solver.more() {
+        while solver.is_unfinished() {
             let relax = solver.relaxation();
             let mut change: f64 = 0.0;
             for (i, row) in g.iter().enumerate() {
@@ -355,8 +363,8 @@ mod tests {
                 next[i] = relax * (new - next[i]) + next[i];
             }
             core::mem::swap(&mut x, &mut next);
-            if solver.took(change) {
-                history.note(&next, &mut x, 1, |_| 1.0);
+            if solver.record_sweep(change) {
+                history.push(&next, &mut x, 1, |_| 1.0);
             }
         }
         (x, next, solver)
@@ -403,11 +411,11 @@ mod tests {
     #[test]
     fn a_white_room_with_a_window_is_bounded_and_one_without_is_not() {
         let mut g = corridor(20, 1.0);
-        let closed = solve(&g, &[1.0; 20], Solver::unit());
+        let closed = solve(&g, &[1.0; 20], Solver::for_inverse_bound());
         assert!(closed.2.inverse(&closed.1, 1.0).is_err());
         // the last cell loses a tenth: the inverse is that of a random walk, at most 20 + sum over 20 cells' way
         g[19][19] -= 0.1;
-        let (_, solution, solver) = solve(&g, &[1.0; 20], Solver::unit());
+        let (_, solution, solver) = solve(&g, &[1.0; 20], Solver::for_inverse_bound());
         let inverse = solver.inverse(&solution, 1.0).unwrap();
         // exactly: v = G v + 1 by flux: the last cell has 20/0.1, each step back adds (cells behind)/0.25
         let exact = 200.0 + (1..20).map(|k| k as f64 / 0.25).sum::<f64>();

@@ -9,7 +9,7 @@ use crate::base::index::{Index, IndexMut, copy, pieces, span};
 use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
 use crate::base::quarter::{self, QUARTERS};
 use crate::coupling::element::Elements;
-use crate::coupling::word::STRAIGHT;
+use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, Row, RowView, TRACED};
 use crate::rays::bvh::Bvh;
 use crate::rays::outline::{Basis, Candidates, OpenSky};
@@ -100,9 +100,9 @@ impl<'a> Straight<'a> {
         }
         let scale = self.scale(unknown, bands, &row.row);
         let mut short = [a, b];
-        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.word, BLOCKED | STRAIGHT)) {
+        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
             // what is open has the other sign
-            let sign = if bundle.word == BLOCKED && row.row.state != ENCLOSED { -scale } else { scale };
+            let sign = if bundle.path == BLOCKED && row.row.state != ENCLOSED { -scale } else { scale };
             let sign = sign * bundle.rays();
             short.iter_mut().zip(bundle.gradient).for_each(|(s, g)| *s += sign * f64::from(g));
         }

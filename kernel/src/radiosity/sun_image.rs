@@ -11,7 +11,7 @@ use crate::base::index::{Index, IndexMut, pieces};
 use crate::base::math::{FRAC_1_PI, Vec3, clamp, frame, narrow, sqrt};
 use crate::base::octahedron;
 use crate::coupling::Record;
-use crate::radiosity::direct::Shape;
+use crate::radiosity::direct::TableShape;
 
 /// Room for images of all sides of facets together: where these are few, and for each.
 const ROOM: (usize, usize) = (1 << 14, 2);
@@ -204,7 +204,7 @@ pub struct SunImages<'a> {
     pub slots: &'a [u64],
     /// Irradiance by light that can be computed at every point: for each unknown and level, one value per band; of sides
     /// with too many images, too.
-    pub thrown: &'a [f64],
+    pub reflected_irradiance: &'a [f64],
 }
 
 /// The images of a side that may be seen from near a point ([`SunImages::near`]).
@@ -244,11 +244,11 @@ impl Iterator for Nearby<'_> {
 
 /// The same while light is noted.
 #[derive(Debug, Default)]
-pub struct Noting<'a> {
+pub struct SunImagesMut<'a> {
     /// As [`SunImages::slots`]; all 0 to begin with.
     pub slots: &'a mut [u64],
-    /// As [`SunImages::thrown`]; all 0 to begin with.
-    pub thrown: &'a mut [f64],
+    /// As [`SunImages::reflected_irradiance`]; all 0 to begin with.
+    pub reflected_irradiance: &'a mut [f64],
     /// Where on its element light falls that may stay a mean, [`SPREAD`] values an unknown; all 0 to begin with.
     pub spread: &'a mut [f32],
     /// Reference radiance, one value per band.
@@ -288,7 +288,7 @@ pub fn variance(spread: &[f32], known: bool) -> f64 {
 /// Rays that all fall on one place of an element: they are said to fill one over so many of them.
 const IMAGE_SHARE_LEAST: f64 = 16.0;
 
-impl Noting<'_> {
+impl SunImagesMut<'_> {
     /// Notes an image in the direction `packed` for one of `sides` sides of facets, that a `mirror` shows.
     pub fn note(&mut self, sides: usize, side: usize, packed: u64, mirror: usize) {
         let direction = unpack(packed);
@@ -325,18 +325,18 @@ impl Noting<'_> {
         self.slots.set(sides, used as u64 + 1);
     }
 
-    /// Notes where on its element a record's light falls; `irradiance` is that of each band for a weight of 1, `exposed` the
+    /// Notes where on its element a record's light falls; `irradiance` is that of each band for a weight of 1, `visible_share` the
     /// part of the element that is not inside a body.
     pub fn spread(
         &mut self,
         unknown: usize,
         record: &Record,
-        exposed: f64,
+        visible_share: f64,
         irradiance: impl Fn(usize) -> f64,
     ) {
         let bands = self.reference.iter().enumerate().filter(|(_, reference)| **reference > 0.0);
         let most = bands.map(|(band, reference)| irradiance(band) / reference).fold(0.0, f64::max);
-        let scale = FRAC_1_PI * most / exposed;
+        let scale = FRAC_1_PI * most / visible_share;
         let start = unknown * SPREAD + if record.image() == 0 { 0 } else { SPREAD / 2 };
         let [a, b, square, count] = record.places();
         let own = [record.weight, a.into(), b.into(), square.into()].map(|x: f64| narrow(scale * x));
@@ -345,8 +345,10 @@ impl Noting<'_> {
     }
 
     /// Adds irradiance of one band of an unknown on one level.
-    pub fn add(&mut self, shape: Shape, (unknown, level): (usize, usize), band: usize, irradiance: f64) {
-        if let Some(value) = self.thrown.get_mut((unknown * shape.levels + level) * shape.bands + band) {
+    pub fn add(&mut self, shape: TableShape, (unknown, level): (usize, usize), band: usize, irradiance: f64) {
+        if let Some(value) =
+            self.reflected_irradiance.get_mut((unknown * shape.levels + level) * shape.bands + band)
+        {
             *value += irradiance;
         }
     }
@@ -359,24 +361,24 @@ impl<'a> SunImages<'a> {
     /// [`Error::Length`] for slices of other lengths; both may be empty where nothing throws sunlight.
     pub fn new(
         slots: &'a [u64],
-        thrown: &'a [f64],
+        reflected_irradiance: &'a [f64],
         sides: usize,
         unknowns: usize,
-        shape: Shape,
+        shape: TableShape,
     ) -> Result<SunImages<'a>, Error> {
         let (places, means) = (places(sides), unknowns * shape.levels * shape.bands);
-        if slots.is_empty() && thrown.is_empty() {
+        if slots.is_empty() && reflected_irradiance.is_empty() {
             return Ok(SunImages::default());
         }
-        if slots.len() != places || thrown.len() != means {
+        if slots.len() != places || reflected_irradiance.len() != means {
             return Err(Error::Length { what: "images of the sun", expected: places, given: slots.len() });
         }
-        Ok(SunImages { slots, thrown })
+        Ok(SunImages { slots, reflected_irradiance })
     }
 
     /// Bytes in use.
     pub fn memory(&self) -> usize {
-        size_of_val(self.slots) + size_of_val(self.thrown)
+        size_of_val(self.slots) + size_of_val(self.reflected_irradiance)
     }
 
     /// Directions toward the images that one of `sides` sides of facets may see.
@@ -420,24 +422,26 @@ impl<'a> SunImages<'a> {
 
     /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.
     #[inline]
-    pub fn mean(&self, shape: Shape, side: usize, (unknown, level): (usize, usize)) -> &'a [f64] {
+    pub fn mean(&self, shape: TableShape, side: usize, (unknown, level): (usize, usize)) -> &'a [f64] {
         if self.slots.is_empty() || !self.are_known(side) {
             return &[];
         }
         let start = (unknown * shape.levels + level) * shape.bands;
-        self.thrown.get(start..start + shape.bands).unwrap_or(&[])
+        self.reflected_irradiance.get(start..start + shape.bands).unwrap_or(&[])
     }
 
     /// Takes such light off the means in the gathered table of all unknowns; `side_of` gives an unknown's side of a facet.
-    pub fn take_off(&self, shape: Shape, side_of: impl Fn(usize) -> usize, table: &mut [f64]) {
+    pub fn take_off(&self, shape: TableShape, side_of: impl Fn(usize) -> usize, table: &mut [f64]) {
         if self.slots.is_empty() {
             return;
         }
         for (unknown, values) in pieces(table, shape.stride()).enumerate() {
             for (level, part) in pieces(values, 3 * shape.bands).enumerate() {
-                let thrown = self.mean(shape, side_of(unknown), (unknown, level));
+                let reflected_irradiance = self.mean(shape, side_of(unknown), (unknown, level));
                 // rounding apart, no less than nothing is left
-                part.iter_mut().zip(thrown).for_each(|(mean, thrown)| *mean = (*mean - thrown).max(0.0));
+                part.iter_mut()
+                    .zip(reflected_irradiance)
+                    .for_each(|(mean, reflected_irradiance)| *mean = (*mean - reflected_irradiance).max(0.0));
             }
         }
     }
@@ -451,31 +455,31 @@ mod tests {
     fn images_are_noted_once_and_too_many_are_means() {
         let sides = 3;
         let mut slots = [0; 3 + 1 + IMAGE_PLACES * ROOM.0];
-        let mut thrown = [1.0; 3];
+        let mut reflected_irradiance = [1.0; 3];
         assert_eq!(places(sides), slots.len());
-        let mut noting = Noting {
+        let mut images_mut = SunImagesMut {
             slots: &mut slots,
-            thrown: &mut thrown,
+            reflected_irradiance: &mut reflected_irradiance,
             spread: &mut [],
             reference: &[1.0],
             corners: &[],
         };
         for x in [0.0, 0.1, 0.1, 0.0, 0.2] {
-            noting.note(sides, 1, pack(Vec3::new(x, 0.0, 1.0).normalize()), 0);
+            images_mut.note(sides, 1, pack(Vec3::new(x, 0.0, 1.0).normalize()), 0);
         }
         for x in 0..SIDE_IMAGES_MOST + 3 {
-            noting.note(sides, 2, pack(Vec3::new(1e-3 * x as f64, 0.0, 1.0).normalize()), 0);
-            noting.note(sides, 1, pack(Vec3::new(0.2, 0.0, 1.0).normalize()), 0);
+            images_mut.note(sides, 2, pack(Vec3::new(1e-3 * x as f64, 0.0, 1.0).normalize()), 0);
+            images_mut.note(sides, 1, pack(Vec3::new(0.2, 0.0, 1.0).normalize()), 0);
         }
-        noting.note(sides, 1, pack(Vec3::new(0.3, 0.0, 1.0).normalize()), 0);
-        let shape = Shape { levels: 1, bands: 1 };
-        let images = SunImages::new(&slots, &thrown, sides, sides, shape).unwrap();
+        images_mut.note(sides, 1, pack(Vec3::new(0.3, 0.0, 1.0).normalize()), 0);
+        let shape = TableShape { levels: 1, bands: 1 };
+        let images = SunImages::new(&slots, &reflected_irradiance, sides, sides, shape).unwrap();
         assert_eq!([0, 1, 2].map(|side| images.of(sides, side).count()), [0, 4, 0]);
         assert_eq!([0, 1, 2].map(|side| images.are_known(side)), [true, true, false]);
         let mut table = [3.0; 9];
         images.take_off(shape, |unknown| unknown, &mut table);
         assert_eq!([table[3], table[4], table[6]], [2.0, 3.0, 3.0]);
-        assert!(SunImages::new(&slots[1..], &thrown, sides, sides, shape).is_err());
+        assert!(SunImages::new(&slots[1..], &reflected_irradiance, sides, sides, shape).is_err());
         let none = SunImages::new(&[], &[], sides, sides, shape).unwrap();
         assert_eq!(none.of(sides, 1).count(), 0);
         none.take_off(shape, |unknown| unknown, &mut table);

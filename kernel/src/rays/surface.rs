@@ -85,7 +85,7 @@ impl Surface {
 
     /// The ray that leaves in `direction`.
     #[inline]
-    pub fn leave(&self, direction: Vec3) -> Ray {
+    pub fn spawn_ray(&self, direction: Vec3) -> Ray {
         Ray {
             origin: self.point + self.normal * OFFSET,
             direction,
@@ -134,7 +134,14 @@ impl Surface {
     /// mirror reflectance that applies: 1 for an ideal mirror, the lobe's albedo over rho_0 for a lobe, of
     /// which `u`, `v` choose the ray.
     #[inline]
-    pub fn go_on(&self, scene: &Scene<'_>, mirror: &Mirror, direction: Vec3, u: f64, v: f64) -> (Vec3, f64) {
+    pub fn sample_reflection(
+        &self,
+        scene: &Scene<'_>,
+        mirror: &Mirror,
+        direction: Vec3,
+        u: f64,
+        v: f64,
+    ) -> (Vec3, f64) {
         let mirrored = self.mirrored(scene, direction);
         match &mirror.lobe {
             None => (mirrored, 1.0),

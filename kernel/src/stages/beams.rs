@@ -5,10 +5,10 @@ use super::{Executor, block_rows};
 use crate::base::arena::ALIGNMENT;
 use crate::base::error::Error;
 use crate::base::index::IndexMut;
-use crate::coupling::{Block, Coupling, sink};
+use crate::coupling::{Block, Coupling, row_builder};
 use crate::radiosity::beam;
 use crate::radiosity::solution::SolutionMemory;
-use crate::radiosity::sun_image::Noting;
+use crate::radiosity::sun_image::SunImagesMut;
 use crate::settings;
 
 /// Beams on their way.
@@ -35,9 +35,9 @@ impl Beams {
     ) -> Result<(), X::Error> {
         let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
         let shape = settings::shape(settings.max_bounces, scene.bands());
-        let mut images = Noting {
+        let mut images = SunImagesMut {
             slots: &mut *solution.slots,
-            thrown: &mut *solution.thrown,
+            reflected_irradiance: &mut *solution.reflected_irradiance,
             spread: &mut *scratch.spread,
             reference: &*solution.reference,
             corners: scene.corners(),
@@ -45,14 +45,14 @@ impl Beams {
         if self.rows == 0 {
             images.spread.fill(0.0);
             images.slots.fill(0);
-            images.thrown.fill(0.0);
+            images.reflected_irradiance.fill(0.0);
         }
         let Some((settings, sun)) = beam_settings(scene, light, settings).zip(light.sun.as_ref()) else {
             return Ok(());
         };
         let all = scene.facets() * scene.sides();
         let piece = block_rows(all);
-        let usual = sink::bytes(piece, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
+        let usual = row_builder::bytes(piece, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
         let usual = usual.next_multiple_of(ALIGNMENT);
         let size = memory.len();
         let mut lanes = run.lanes().min(size / usual.max(1)).max(1);
@@ -79,9 +79,9 @@ impl Beams {
                     break;
                 }
                 let block = [block];
-                let thrown = Coupling::part(&block);
-                beam::add(&thrown, (coupling, elements), sun, shape, scratch.direct, &mut images);
-                self.rays += thrown.rows(done.clone()).map(|(_, r)| r.row.all_rays()).sum::<u64>();
+                let beams = Coupling::part(&block);
+                beam::add(&beams, (coupling, elements), sun, shape, scratch.direct, &mut images);
+                self.rays += beams.rows(done.clone()).map(|(_, r)| r.row.all_rays()).sum::<u64>();
                 self.rows = done.end;
             }
             if self.rows == first {

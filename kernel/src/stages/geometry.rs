@@ -5,11 +5,11 @@ use crate::base::arena::{ALIGNMENT, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::coupling::element::Elements;
-use crate::coupling::facing::Facing;
 use crate::coupling::pack::{move_down, pack};
+use crate::coupling::plane_sides::PlaneSides;
 use crate::coupling::rows::{RowSettings, fill};
-use crate::coupling::subdivide::Cut;
-use crate::coupling::{Block, sink};
+use crate::coupling::subdivide::SubdivisionTree;
+use crate::coupling::{Block, row_builder};
 use crate::rays::bvh::Bvh;
 use crate::scene::Scene;
 use crate::settings::{self, Settings};
@@ -24,24 +24,24 @@ const FIRST_ROUND_SHARE: f64 = 0.9;
 /// Records that a row is taken to have before any is done, and the least that is reserved for one.
 const LEAST_RECORDS: usize = 64;
 
-/// Refines `cut` until nothing is left to refine; returns the rays.
+/// Refines `tree` until nothing is left to refine; returns the rays.
 pub fn refine<X: Executor>(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,
-    facing: &Facing<'_>,
+    plane_sides: &PlaneSides<'_>,
     settings: &Settings,
-    cut: &mut Cut<'_>,
+    tree: &mut SubdivisionTree<'_>,
     run: &mut X,
 ) -> Result<u64, X::Error> {
     let probing = settings::probing(&settings.rows(scene));
     let mut rays = 0;
     loop {
-        let (work, unevenness) = cut.work();
+        let (level, unevenness) = tree.newest_level();
         let Count(traced) = run.rows(unevenness, 1, CUT_SHARE, |range, out| {
-            work.probe(scene, bvh, facing, (probing, &settings.budget), range, out).map(Count)
+            level.probe(scene, bvh, plane_sides, (probing, &settings.budget), range, out).map(Count)
         })?;
         rays += traced;
-        if !cut.refine(scene) {
+        if !tree.refine(scene) {
             return Ok(rays);
         }
     }
@@ -57,7 +57,7 @@ pub struct CouplingRows<'a> {
     /// Its elements.
     pub elements: &'a Elements<'a>,
     /// Its facets' planes.
-    pub facing: &'a Facing<'a>,
+    pub plane_sides: &'a PlaneSides<'a>,
     /// How rows are computed.
     pub rows: RowSettings,
 }
@@ -96,15 +96,15 @@ impl CouplingRows<'_> {
 
     /// Computes rows of `range` in order, until all are done or the memory is full.
     fn fill_range(&self, range: Range<usize>, memory: &mut impl BlockMemory) -> Result<(), Error> {
-        let CouplingRows { scene, bvh, elements, facing, rows } = self;
+        let CouplingRows { scene, bvh, elements, plane_sides, rows } = self;
         let piece = block_rows(elements.unknowns());
         let (mut next, mut records, mut unmerged) = (range.start, LEAST_RECORDS, settings::unmerged(rows));
         while next < range.end {
             let until = (next + piece).min(range.end);
-            let wanted = sink::bytes(until - next, records, unmerged, scene.bands())?;
+            let wanted = row_builder::bytes(until - next, records, unmerged, scene.bands())?;
             let wanted = wanted.next_multiple_of(ALIGNMENT);
             let block = memory.lend(wanted)?;
-            match fill(scene, bvh, elements, facing, rows, next..until, block) {
+            match fill(scene, bvh, elements, plane_sides, rows, next..until, block) {
                 Ok(done) => {
                     next += done;
                     records = LEAST_RECORDS.max(Block::open(block)?.records() / done.max(1) + 16);
@@ -165,7 +165,7 @@ const LANE_ROWS: usize = 16;
 
 /// Bytes in which rows may begin: those of one piece, while the last of them grows.
 pub fn least_bytes(scene: &Scene<'_>, rows: &RowSettings, unknowns: usize) -> Result<usize, Error> {
-    sink::bytes(block_rows(unknowns), LEAST_RECORDS, settings::unmerged(rows), scene.bands())
+    row_builder::bytes(block_rows(unknowns), LEAST_RECORDS, settings::unmerged(rows), scene.bands())
 }
 
 plain_struct! {
@@ -306,7 +306,8 @@ impl Packer<'_> {
         let (all, given) = (elements.unknowns(), self.memory.len());
         let done: usize = self.places.iter().take(self.used).map(|p| p.rows).sum();
         let per_row = self.end.checked_div(done).unwrap_or(0);
-        let fixed = sink::bytes(1, LEAST_RECORDS, settings::unmerged(rows), scene.bands()).unwrap_or(0);
+        let fixed =
+            row_builder::bytes(1, LEAST_RECORDS, settings::unmerged(rows), scene.bands()).unwrap_or(0);
         let needed = per_row.saturating_mul(all).saturating_add(per_row * (all - done) / 4);
         Error::BufferTooSmall { needed: needed.saturating_add(2 * fixed).max(given + fixed), given }
     }

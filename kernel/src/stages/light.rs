@@ -4,10 +4,10 @@ use super::{Count, Executor};
 use crate::base::arena::{ALIGNMENT, Arena, Need};
 use crate::base::error::Error;
 use crate::coupling::element::Elements;
-use crate::coupling::{Coupling, sink};
+use crate::coupling::{Coupling, row_builder};
 use crate::radiosity::accuracy::Own;
 use crate::radiosity::beam::{self, BeamSettings};
-use crate::radiosity::direct::{self, Shape};
+use crate::radiosity::direct::{self, TableShape};
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Solution, SolutionMemory, SolutionSize};
 use crate::radiosity::solver;
@@ -89,7 +89,7 @@ impl Sizes {
         let shape = settings::shape(max_bounces, scene.bands());
         let (mut beams, mut places) = (0, 0);
         if let Some(settings) = beam_settings(scene, light, settings) {
-            beams = sink::bytes(16, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
+            beams = row_builder::bytes(16, 64, beam::unmerged(scene, elements, &settings), scene.bands())?;
             places = sun_image::places(elements.facet_sides());
         }
         let straight = light.sky.as_ref().is_some_and(|sky| straight::basis(bvh, sky).is_some());
@@ -139,7 +139,7 @@ impl Sizes {
     }
 
     /// Shape of the irradiance table.
-    pub fn shape(&self) -> Shape {
+    pub fn shape(&self) -> TableShape {
         self.solution.shape
     }
 }

@@ -24,9 +24,17 @@ pub(super) fn solve<'m, X: Executor>(
     run: &mut X,
 ) -> Result<Solution<'m>, X::Error> {
     let Lighting { scene, elements, coupling, light, settings, .. } = *of;
-    let SolutionMemory { reference, irradiance, straight, straight_variance, sun, slots, thrown, variance } =
-        memory;
-    let (sun, images) = (&*sun, SunImages { slots, thrown });
+    let SolutionMemory {
+        reference,
+        irradiance,
+        straight,
+        straight_variance,
+        sun,
+        slots,
+        reflected_irradiance,
+        variance,
+    } = memory;
+    let (sun, images) = (&*sun, SunImages { slots, reflected_irradiance });
     let shape = crate::settings::shape(settings.max_bounces, scene.bands());
     let Scratch { direct, orders, own, carried, spread, dark, .. } = scratch;
     let size = elements.unknowns() * shape.bands;
@@ -39,7 +47,7 @@ pub(super) fn solve<'m, X: Executor>(
         system.lit_radiance(*dark, irradiance, reference);
         let missed = orders.part_mut(size..2 * size);
         run.rows(missed, shape.bands, 0.0, |range, out| {
-            system.slopes(range, irradiance, out);
+            system.gradient_source(range, irradiance, out);
             Ok(())
         })?;
         direct::add(missed, shape, direct);
@@ -54,7 +62,7 @@ pub(super) fn solve<'m, X: Executor>(
     let radiance = orders.part(at * size..(at + 1) * size);
     limits::check_radiance(radiance, shape.bands)?;
     images.take_off(shape, |unknown| elements.facet_side(unknown), irradiance);
-    system.extend(irradiance);
+    system.fill_absent_rows(irradiance);
     errors(&system, radiance, reference, (own, carried), variance, run)?;
     // what no ray of a row has met may be a lamp
     let glare = (0..shape.bands).filter(|band| *dark >> band & 1 == 1 && reference.at(*band) > 0.0);
@@ -78,7 +86,7 @@ pub(super) fn solve<'m, X: Executor>(
     };
     let seen = Straight::default();
     let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
-    system.extend_straight(straight, straight_variance);
+    system.fill_absent_straight(straight, straight_variance);
     Ok(Solution {
         shape,
         reference,
@@ -106,7 +114,7 @@ fn errors<X: Executor>(
     let own = &*own;
     for number in 0..accuracy::carried(system.scene) {
         let from = if number > 0 { &*carried } else { &[] };
-        run.rows(next, bands, 0.0, |range, out| accuracy::carry(system, own, from, range, out))?;
+        run.rows(next, bands, 0.0, |range, out| accuracy::propagate(system, own, from, range, out))?;
         core::mem::swap(&mut carried, &mut next);
     }
     run.rows(out, 1, 0.0, |range, out| accuracy::rows(system, own, carried, range, out))
@@ -207,16 +215,16 @@ impl Solve<'_> {
         let bands = self.system.shape.bands;
         let Largest(q) =
             run.rows(to, bands, SHARES[2], |range, _| Ok(Largest(self.system.contraction(range))))?;
-        let deficits = from.len().min(history.len());
-        run.rows(history.head_mut(deficits), bands, 0.0, |range, out| {
-            self.system.deficits(range, out);
+        let row_deficits = from.len().min(history.len());
+        run.rows(history.head_mut(row_deficits), bands, 0.0, |range, out| {
+            self.system.row_deficits(range, out);
             Ok(())
         })?;
         if !Solver::is_closed(q, self.settings.max_bounces) {
             return Ok((Bounds { q, inverse: None }, 0));
         }
         from.fill(0.0);
-        let mut unit = Solver::unit();
+        let mut unit = Solver::for_inverse_bound();
         let ends = self.iterate(&mut unit, [from, to], history, run, |range, from, to, relax| {
             self.system.unit_sweep(range, from, to, relax)
         })?;
@@ -234,13 +242,13 @@ impl Solve<'_> {
     ) -> Result<[&'o [f64]; 2], X::Error> {
         let bands = self.system.shape.bands;
         let mut history = History::new(history, latest.len());
-        while solver.more() {
+        while solver.is_unfinished() {
             let (seen, relaxation) = (&*latest, solver.relaxation());
             let Largest(change) =
                 run.rows(next, bands, 0.0, |range, out| Ok(Largest(sweep(range, seen, out, relaxation))))?;
             core::mem::swap(&mut latest, &mut next);
-            if solver.took(change) {
-                history.note(next, latest, bands, |at| self.system.weight(at));
+            if solver.record_sweep(change) {
+                history.push(next, latest, bands, |at| self.system.weight(at));
             }
         }
         Ok([latest, next])

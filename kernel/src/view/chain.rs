@@ -1,16 +1,16 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
 
-mod crowd;
+mod fine_detail;
 mod gather;
-mod outlook;
+mod occluders;
 mod straight;
 mod sunlight;
 
-use crowd::{FINE_DETAIL_ERROR, Surroundings};
+use fine_detail::{DetailCache, FINE_DETAIL_ERROR};
 pub(crate) use gather::{CAUTION, GATHERS};
-use gather::{Gathered, Onward, Spot};
-pub(crate) use outlook::{Outlook, Way};
+use gather::{GatherPoint, Gathered, Onward};
+pub(crate) use occluders::{OccluderCache, Occluders};
 use straight::OpenAt;
 
 use crate::base::arena::plain_table;
@@ -19,7 +19,7 @@ use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::element::{Elements, Local};
-use crate::coupling::sink::CLOSED_REMAINDER_MOST;
+use crate::coupling::row_builder::CLOSED_REMAINDER_MOST;
 use crate::radiosity::solution::Solution;
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::{Hit, Ray};
@@ -28,7 +28,7 @@ use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::view::camera::Camera;
 use core::ops::Deref;
-use outlook::Toward;
+use occluders::RayKind;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,9 +128,9 @@ plain_table! {
 
 plain_table! {
     /// What a chain needs while it is followed, of any content: too large for small stacks.
-    pub struct Work {
+    pub struct ChainScratch {
         /// Product of the reflectances along the chain, and along a ray of a lobe.
-        pub through: [[f64; MAX_BANDS]; 2],
+        pub throughput: [[f64; MAX_BANDS]; 2],
         /// Sums over a lobe's rays.
         pub sums: Terms,
         /// Sums of their squares.
@@ -144,10 +144,10 @@ plain_table! {
     }
 }
 
-impl Work {
+impl ChainScratch {
     /// All zero.
-    pub const ZERO: Work = Work {
-        through: [[0.0; MAX_BANDS]; 2],
+    pub const ZERO: ChainScratch = ChainScratch {
+        throughput: [[0.0; MAX_BANDS]; 2],
         sums: Terms::ZERO,
         squares: [0.0; MAX_BANDS],
         before: [0.0; MAX_BANDS],
@@ -220,15 +220,15 @@ pub struct Path {
 
 /// Which ray of an image it is, so that lobes and penumbrae of different rays are sampled apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sample {
+pub enum RaySample {
     /// A ray that stands for itself: lobes and penumbrae are integrated.
-    Alone(u32),
+    Integrate(u32),
     /// A ray that stands for itself unless it meets lobes or penumbrae ([`Path::sampled`]): then it is one of many
     /// that are wanted.
-    Glance(u32),
+    Probe(u32),
     /// Ray number `index` of those that `seed` names and whose mean counts: one point of the sun's disc and one ray of
     /// each lobe. Coordinates 2 to 5 of the sequence `seed` choose them; 0 and 1 are for the place in the pixel.
-    OneOf {
+    Stratum {
         /// Names the rays.
         seed: u32,
         /// This ray among them.
@@ -236,20 +236,20 @@ pub enum Sample {
     },
 }
 
-impl Sample {
+impl RaySample {
     /// A number for the sequences of one ray.
     fn seed(self) -> u32 {
         match self {
-            Sample::Alone(seed) | Sample::Glance(seed) => seed,
-            Sample::OneOf { seed, index } => hash2(seed, index + 1),
+            RaySample::Integrate(seed) | RaySample::Probe(seed) => seed,
+            RaySample::Stratum { seed, index } => hash2(seed, index + 1),
         }
     }
 
     /// Turns by which the rays of a lobe's set are rotated, so that sets that count together differ.
     fn turn(self, set: u32) -> f64 {
         let index = match self {
-            Sample::Alone(_) | Sample::Glance(_) => 0,
-            Sample::OneOf { index, .. } => index,
+            RaySample::Integrate(_) | RaySample::Probe(_) => 0,
+            RaySample::Stratum { index, .. } => index,
         };
         let (turn, _) = Sequence::new(0x10be).pair(hash2(index, set) & 0xffff, 0);
         if index == 0 && set == 0 { 0.0 } else { turn }
@@ -263,8 +263,8 @@ impl Sample {
     /// sunflower fill four dimensions more evenly than nets whose count is no power of two; beyond at random.
     fn lobe_point(self, lobe: u32) -> (f64, f64) {
         let (seed, index) = match self {
-            Sample::Alone(seed) | Sample::Glance(seed) => (seed, 0),
-            Sample::OneOf { seed, index } => (seed, index),
+            RaySample::Integrate(seed) | RaySample::Probe(seed) => (seed, 0),
+            RaySample::Stratum { seed, index } => (seed, index),
         };
         if lobe == 1 {
             return Sequence::new(seed).pair(index & 0xffff, 4);
@@ -280,18 +280,18 @@ impl Sample {
 }
 
 /// How a ray is followed: which one it is, and what is known of what stands before facets.
-struct How<'w, 'm> {
-    sample: Sample,
-    outlook: &'w mut Outlook<'m>,
+struct Mode<'w, 'm> {
+    sample: RaySample,
+    occluders: &'w mut OccluderCache<'m>,
     /// Whether the first lobe ends it where the ray stands for itself.
     branches: bool,
 }
 
 /// A chain on its way.
-struct Leg<'w> {
+struct PathState<'w> {
     ray: Ray,
     /// Product of the mirror reflectances so far, per band.
-    through: &'w mut [f64; MAX_BANDS],
+    throughput: &'w mut [f64; MAX_BANDS],
     /// Mirrors met.
     mirrors: u32,
     /// Lobes among them.
@@ -332,18 +332,18 @@ const FEWEST_LOBE_RAYS: u32 = 4;
 const MOST_LOBE_RAYS: f64 = 1024.0;
 
 /// The rays of one lobe so far: sums over them.
-struct Fan<'w> {
+struct LobeSamples<'w> {
     terms: &'w mut Terms,
     path: Path,
     /// Sum of the squared radiances of each band.
     squares: &'w mut [f64; MAX_BANDS],
     before: &'w mut [f64; MAX_BANDS],
     /// Product of the reflectances along the latest ray.
-    through: &'w mut [f64; MAX_BANDS],
+    throughput: &'w mut [f64; MAX_BANDS],
     count: u32,
 }
 
-impl Fan<'_> {
+impl LobeSamples<'_> {
     /// Standard deviation of a ray's radiance over the reference radiance, the largest of all bands.
     fn spread(&self, reference: &[f64]) -> f64 {
         let n = f64::from(self.count.max(1));
@@ -359,12 +359,12 @@ impl Fan<'_> {
         largest
     }
 
-    /// Expected error of the mean over the reference radiance; `through` is what a radiance of 1 brings.
+    /// Expected error of the mean over the reference radiance; `throughput` is what a radiance of 1 brings.
     #[inline(never)]
-    fn error(&self, reference: &[f64], through: f64) -> f64 {
+    fn error(&self, reference: &[f64], throughput: f64) -> f64 {
         let n = f64::from(self.count.max(1));
         let (seen, between) =
-            (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), BETWEEN * through / n);
+            (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), BETWEEN * throughput / n);
         let glare = self.path.glare / n;
         sqrt(seen * seen + between * between + glare * glare)
     }
@@ -389,37 +389,37 @@ impl Fan<'_> {
 
 impl Solved<'_> {
     /// Radiance against `ray`, added to `terms` (cleared by the caller).
-    pub fn radiance(&self, ray: &Ray, sample: Sample, terms: &mut Terms) -> Path {
-        self.radiance_at((ray, self.bvh.closest(ray)), sample, terms, &mut { Work::ZERO })
+    pub fn radiance(&self, ray: &Ray, sample: RaySample, terms: &mut Terms) -> Path {
+        self.radiance_at((ray, self.bvh.closest(ray)), sample, terms, &mut { ChainScratch::ZERO })
     }
 
     /// The same of a ray that is known to meet `hit` first, in the caller's memory.
     pub fn radiance_at(
         &self,
         seen: (&Ray, Option<Hit>),
-        sample: Sample,
+        sample: RaySample,
         terms: &mut Terms,
-        work: &mut Work,
+        work: &mut ChainScratch,
     ) -> Path {
-        self.radiance_with(seen, sample, terms, work, &mut Outlook::none())
+        self.radiance_with(seen, sample, terms, work, &mut OccluderCache::none())
     }
 
     /// The same with what is known of what stands before facets: fewer rays, and the same bits.
     pub(crate) fn radiance_with(
         &self,
         (ray, hit): (&Ray, Option<Hit>),
-        sample: Sample,
+        sample: RaySample,
         terms: &mut Terms,
-        work: &mut Work,
-        outlook: &mut Outlook<'_>,
+        work: &mut ChainScratch,
+        occluders: &mut OccluderCache<'_>,
     ) -> Path {
         let mut path = Path::default();
-        let Work { through: [through, next], sums, squares, before, images, gathered } = work;
-        through.head_mut(self.shape.bands).fill(1.0);
+        let ChainScratch { throughput: [throughput, next], sums, squares, before, images, gathered } = work;
+        throughput.head_mut(self.shape.bands).fill(1.0);
         let (sunless, gathered) = (false, Some(gathered));
-        let mut leg = Leg {
+        let mut state = PathState {
             ray: *ray,
-            through,
+            throughput,
             mirrors: 0,
             lobes: 0,
             lobe: false,
@@ -431,11 +431,17 @@ impl Solved<'_> {
             step: 0.0,
             onward: None,
         };
-        let how = &mut How { sample, outlook, branches: true };
-        if let Some(lobe) = self.follow(&mut leg, hit, how, terms, &mut path) {
-            let mut fan =
-                Fan { terms: sums, path: Path::default(), squares, before, through: next, count: 0 };
-            self.branch(&mut leg, &lobe, how, terms, &mut path, &mut fan);
+        let mode = &mut Mode { sample, occluders, branches: true };
+        if let Some(lobe) = self.follow(&mut state, hit, mode, terms, &mut path) {
+            let mut samples = LobeSamples {
+                terms: sums,
+                path: Path::default(),
+                squares,
+                before,
+                throughput: next,
+                count: 0,
+            };
+            self.branch(&mut state, &lobe, mode, terms, &mut path, &mut samples);
         }
         path
     }
@@ -444,81 +450,85 @@ impl Solved<'_> {
     /// the first lobe. All other lobes take one ray.
     fn follow(
         &self,
-        leg: &mut Leg<'_>,
+        state: &mut PathState<'_>,
         mut hit: Option<Hit>,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
     ) -> Option<Hit> {
         loop {
             let Some(met) = hit else {
-                self.escape(leg, terms);
-                path.chance = path.chance.max(self.chance(leg));
+                self.escape(state, terms);
+                path.chance = path.chance.max(self.chance(state));
                 return None;
             };
-            path.object |= leg.mirrors == 0;
-            leg.far += met.t;
-            leg.step = met.t;
+            path.object |= state.mirrors == 0;
+            state.far += met.t;
+            state.step = met.t;
             let surface = Surface::of_hit(self.scene, &met)?;
-            self.add_diffuse(leg, &surface, how, terms, path);
+            self.add_diffuse(state, &surface, mode, terms, path);
             let mirror = surface.mirror(self.scene)?;
-            if self.settings.max_bounces.is_some_and(|most| leg.mirrors >= most) {
+            if self.settings.max_bounces.is_some_and(|most| state.mirrors >= most) {
                 return None;
             }
             let specular = self.scene.specular(surface.material);
             let bands = self.shape.bands;
             let mut largest = 0.0;
-            for (through, rho) in leg.through.head_mut(bands).iter_mut().zip(specular) {
-                *through *= rho;
-                largest = f64::max(largest, *through);
+            for (throughput, rho) in state.throughput.head_mut(bands).iter_mut().zip(specular) {
+                *throughput *= rho;
+                largest = f64::max(largest, *throughput);
             }
             if largest * self.numbers.brightest < self.settings.budget.chains
-                || leg.mirrors as usize >= crate::coupling::word::MIRRORS_MOST
+                || state.mirrors as usize >= crate::coupling::mirror_path::MIRRORS_MOST
             {
                 path.tail += largest * self.numbers.brightest;
-                self.close(leg, terms);
+                self.close(state, terms);
                 return None;
             }
-            leg.mirrors += 1;
-            leg.lobe =
-                mirror.lobe.is_some() || leg.lobe && leg.imaged && surface.flat_mirror(self.scene).is_some();
-            let apart = self.settings.apart && leg.mirrors == 1;
+            state.mirrors += 1;
+            state.lobe = mirror.lobe.is_some()
+                || state.lobe && state.imaged && surface.flat_mirror(self.scene).is_some();
+            let apart = self.settings.apart && state.mirrors == 1;
             if apart && mirror.lobe.is_none() {
-                (leg.lobe, leg.imaged) = (true, !self.images.slots.is_empty() && self.knows_images(&surface));
+                (state.lobe, state.imaged) =
+                    (true, !self.images.slots.is_empty() && self.knows_images(&surface));
             }
             match &mirror.lobe {
                 None => {
-                    let direction = surface.mirrored(self.scene, leg.ray.direction);
-                    leg.ray = surface.leave(direction);
-                    if leg.mirrors == 1
-                        && !leg.sunless
-                        && how.outlook.is_parallel()
+                    let direction = surface.mirrored(self.scene, state.ray.direction);
+                    state.ray = surface.spawn_ray(direction);
+                    if state.mirrors == 1
+                        && !state.sunless
+                        && mode.occluders.is_parallel()
                         && !self.scene.is_smooth()
                         && let Some(known) =
-                            how.outlook.before(self, &surface, Toward::Mirror, (direction, 0.0))
+                            mode.occluders.before(self, &surface, RayKind::Mirror, (direction, 0.0))
                     {
                         path.rays += u32::from(!known.is_empty());
-                        hit = self.bvh.closest_among(&leg.ray, known);
+                        hit = self.bvh.closest_among(&state.ray, known);
                         continue;
                     }
                 }
                 Some(lobe) => {
                     if !(apart && lobe.ratio() >= APART) {
-                        self.add_sun_gloss(leg, &surface, &mirror, how, terms, path);
+                        self.add_sun_gloss(state, &surface, &mirror, mode, terms, path);
                     }
-                    leg.imaged = self.knows_images(&surface);
-                    leg.lobes += 1;
+                    state.imaged = self.knows_images(&surface);
+                    state.lobes += 1;
                     let asked = self.scene.gloss_rays(surface.material).is_some();
                     path.sampled |= !asked;
-                    if leg.lobes == 1 && how.branches && (asked || matches!(how.sample, Sample::Alone(_))) {
+                    if state.lobes == 1
+                        && mode.branches
+                        && (asked || matches!(mode.sample, RaySample::Integrate(_)))
+                    {
                         return Some(met);
                     }
-                    let (u, v) = how.sample.lobe_point(leg.lobes);
-                    self.turn(leg, &surface, &mirror, u, v);
+                    let (u, v) = mode.sample.lobe_point(state.lobes);
+                    self.turn(state, &surface, &mirror, u, v);
                 }
             }
             path.rays += 1;
-            hit = self.bvh.closest(&leg.ray);
+            hit = self.bvh.closest(&state.ray);
         }
     }
 
@@ -526,13 +536,13 @@ impl Solved<'_> {
     /// S/(1 - t) with the product t of its mirrors. Where all facets shine alike that is exact; it adds no more than
     /// the part that the bound on the tail allows for. Lobes, which lose light at grazing angles, are left as they are.
     #[cold]
-    fn close(&self, leg: &Leg, terms: &mut Terms) {
-        if leg.lobes > 0 {
+    fn close(&self, state: &PathState, terms: &mut Terms) {
+        if state.lobes > 0 {
             return;
         }
-        for (band, &through) in leg.through.head(self.shape.bands).iter().enumerate() {
-            if through <= CLOSED_REMAINDER_MOST {
-                let all = terms.mirror_diffuse.at(band) + terms.sum(band) * through / (1.0 - through);
+        for (band, &throughput) in state.throughput.head(self.shape.bands).iter().enumerate() {
+            if throughput <= CLOSED_REMAINDER_MOST {
+                let all = terms.mirror_diffuse.at(band) + terms.sum(band) * throughput / (1.0 - throughput);
                 terms.mirror_diffuse.set(band, all);
             }
         }
@@ -540,10 +550,10 @@ impl Solved<'_> {
 
     /// One ray of a lobe, weighed with the lobe's albedo.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
-    fn turn(&self, leg: &mut Leg<'_>, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
-        let (direction, share) = surface.go_on(self.scene, mirror, leg.ray.direction, u, v);
-        leg.through.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
-        leg.ray = surface.leave(direction);
+    fn turn(&self, state: &mut PathState<'_>, surface: &Surface, mirror: &Mirror, u: f64, v: f64) {
+        let (direction, share) = surface.sample_reflection(self.scene, mirror, state.ray.direction, u, v);
+        state.throughput.head_mut(self.shape.bands).iter_mut().for_each(|t| *t *= share);
+        state.ray = surface.spawn_ray(direction);
     }
 
     /// Equal-energy rays of the visible lobe: as many as its material asks for; or a first set by the tolerance and,
@@ -551,44 +561,44 @@ impl Solved<'_> {
     #[inline(never)]
     fn branch<'w>(
         &self,
-        leg: &mut Leg<'w>,
+        state: &mut PathState<'w>,
         hit: &Hit,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-        fan: &mut Fan<'w>,
+        samples: &mut LobeSamples<'w>,
     ) {
         let Some(surface) = Surface::of_hit(self.scene, hit) else { return };
         let Some(lobe) = surface.mirror(self.scene).and_then(|mirror| mirror.lobe) else { return };
         let bands = self.shape.bands;
-        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
+        let mirrored = surface.mirrored(self.scene, state.ray.direction);
         let albedo = lobe.albedo(mirrored.dot(surface.normal));
-        leg.through.head_mut(bands).iter_mut().for_each(|t| *t *= albedo);
-        let largest = leg.through.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
+        state.throughput.head_mut(bands).iter_mut().for_each(|t| *t *= albedo);
+        let largest = state.throughput.head(bands).iter().fold(0.0, |a: f64, &b| a.max(b));
 
         let asked = self.scene.gloss_rays(surface.material);
         let mut goal = asked.unwrap_or_else(|| self.first_rays(largest));
-        fan.terms.clear(bands);
-        fan.squares.head_mut(bands).fill(0.0);
+        samples.terms.clear(bands);
+        samples.squares.head_mut(bands).fill(0.0);
         for set in 0..2 {
-            let n = goal.saturating_sub(fan.count);
-            let turn = how.sample.turn(set);
+            let n = goal.saturating_sub(samples.count);
+            let turn = mode.sample.turn(set);
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
-                self.add_ray(leg, surface.leave(direction), how, fan);
+                self.add_ray(state, surface.spawn_ray(direction), mode, samples);
             }
             if asked.is_none() {
-                goal = self.all_rays(fan.spread(self.reference), fan.path.glare);
+                goal = self.all_rays(samples.spread(self.reference), samples.path.glare);
             }
         }
-        path.noise += fan.error(self.reference, largest);
-        fan.mean_into(terms, path, bands);
+        path.noise += samples.error(self.reference, largest);
+        samples.mean_into(terms, path, bands);
     }
 
-    /// Rays of a lobe's first set, for a lobe whose light counts `through`: what they may miss between them is small
+    /// Rays of a lobe's first set, for a lobe whose light counts `throughput`: what they may miss between them is small
     /// against the tolerance.
-    fn first_rays(&self, through: f64) -> u32 {
-        let wanted = FIRST_RAYS * through / self.settings.budget.image;
+    fn first_rays(&self, throughput: f64) -> u32 {
+        let wanted = FIRST_RAYS * throughput / self.settings.budget.image;
         (wanted.min(MOST_LOBE_RAYS) as u32).max(FEWEST_LOBE_RAYS)
     }
 
@@ -599,36 +609,45 @@ impl Solved<'_> {
         wanted.min(MOST_LOBE_RAYS) as u32
     }
 
-    /// One more ray of the lobe that `leg` has met, to its end. The leg is lent to the ray, as it is all that the stack has
-    /// room for, and given back but for its own ray.
-    fn add_ray<'w>(&self, leg: &mut Leg<'w>, ray: Ray, how: &mut How<'_, '_>, fan: &mut Fan<'w>) {
+    /// One more ray of the lobe that `state` has met, to its end. Its state is lent to the ray, as the stack has room for
+    /// one alone, and given back but for its own ray.
+    fn add_ray<'w>(
+        &self,
+        state: &mut PathState<'w>,
+        ray: Ray,
+        mode: &mut Mode<'_, '_>,
+        samples: &mut LobeSamples<'w>,
+    ) {
         let bands = self.shape.bands;
-        fan.before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = fan.terms.sum(b));
-        copy(fan.through.head_mut(bands), leg.through.head(bands));
-        fan.path.rays += 1;
-        let sample = Sample::OneOf { seed: how.sample.seed(), index: fan.count };
-        let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
+        samples.before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = samples.terms.sum(b));
+        copy(samples.throughput.head_mut(bands), state.throughput.head(bands));
+        samples.path.rays += 1;
+        let sample = RaySample::Stratum { seed: mode.sample.seed(), index: samples.count };
+        let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false };
         let hit = self.bvh.closest(&ray);
-        let Leg { mirrors, lobes, far, imaged, .. } = *leg;
-        let gathered = leg.gathered.take();
-        (leg.ray, leg.lobe) = (ray, true);
-        core::mem::swap(&mut leg.through, &mut fan.through);
-        self.follow(leg, hit, &mut how, fan.terms, &mut fan.path);
-        core::mem::swap(&mut leg.through, &mut fan.through);
-        (leg.mirrors, leg.lobes, leg.far, leg.imaged, leg.gathered) = (mirrors, lobes, far, imaged, gathered);
-        for (b, (square, before)) in fan.squares.iter_mut().zip(fan.before.iter()).enumerate().take(bands) {
-            let value = fan.terms.sum(b) - before;
+        let PathState { mirrors, lobes, far, imaged, .. } = *state;
+        let gathered = state.gathered.take();
+        (state.ray, state.lobe) = (ray, true);
+        core::mem::swap(&mut state.throughput, &mut samples.throughput);
+        self.follow(state, hit, &mut mode, samples.terms, &mut samples.path);
+        core::mem::swap(&mut state.throughput, &mut samples.throughput);
+        (state.mirrors, state.lobes, state.far, state.imaged, state.gathered) =
+            (mirrors, lobes, far, imaged, gathered);
+        for (b, (square, before)) in
+            samples.squares.iter_mut().zip(samples.before.iter()).enumerate().take(bands)
+        {
+            let value = samples.terms.sum(b) - before;
             *square += value * value;
         }
-        fan.count += 1;
+        samples.count += 1;
     }
 
     /// See [`Path::chance`].
     #[inline]
-    fn chance(&self, leg: &Leg<'_>) -> f64 {
+    fn chance(&self, state: &PathState<'_>) -> f64 {
         match &self.light.sun {
-            Some(sun) if !sun.is_point() && leg.mirrors > 0 && !leg.lobe && !leg.sunless => {
-                0.25 * FRAC_1_PI * self.gloss_at_stake(leg.through, sun)
+            Some(sun) if !sun.is_point() && state.mirrors > 0 && !state.lobe && !state.sunless => {
+                0.25 * FRAC_1_PI * self.gloss_at_stake(state.throughput, sun)
             }
             _ => 0.0,
         }
@@ -636,22 +655,22 @@ impl Solved<'_> {
 
     /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.
     #[inline(never)]
-    fn escape(&self, leg: &Leg<'_>, terms: &mut Terms) {
+    fn escape(&self, state: &PathState<'_>, terms: &mut Terms) {
         let bands = self.shape.bands;
         if let Some(sky) = &self.light.sky {
             let mut radiance = [0.0; MAX_BANDS];
-            sky.radiance(leg.ray.direction, radiance.head_mut(bands));
-            let own = radiance.iter().zip(leg.through.iter()).take(bands);
-            terms.mirror_sky.iter_mut().zip(own).for_each(|(to, (l, through))| *to += through * l);
+            sky.radiance(state.ray.direction, radiance.head_mut(bands));
+            let own = radiance.iter().zip(state.throughput.iter()).take(bands);
+            terms.mirror_sky.iter_mut().zip(own).for_each(|(to, (l, throughput))| *to += throughput * l);
         }
         if let Some(sun) = &self.light.sun
             && !sun.is_point()
-            && !leg.lobe
-            && !leg.sunless
-            && sun.contains(leg.ray.direction)
+            && !state.lobe
+            && !state.sunless
+            && sun.contains(state.ray.direction)
         {
-            let own = terms.mirror_sky.iter_mut().zip(leg.through.iter()).take(bands);
-            own.enumerate().for_each(|(band, (to, through))| *to += through * sun.disc_radiance(band));
+            let own = terms.mirror_sky.iter_mut().zip(state.throughput.iter()).take(bands);
+            own.enumerate().for_each(|(band, (to, throughput))| *to += throughput * sun.disc_radiance(band));
         }
     }
 
@@ -659,23 +678,23 @@ impl Solved<'_> {
     #[inline]
     fn add_diffuse(
         &self,
-        leg: &mut Leg<'_>,
+        state: &mut PathState<'_>,
         surface: &Surface,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
     ) {
         let bands = self.shape.bands;
-        let to = if leg.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
+        let to = if state.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
         let emission = self.scene.emission(surface.material);
         to.iter_mut()
-            .zip(leg.through.iter())
+            .zip(state.throughput.iter())
             .zip(emission)
-            .for_each(|((to, through), own)| *to += through * own);
+            .for_each(|((to, throughput), own)| *to += throughput * own);
         let diffuse = self.scene.diffuse(surface.material);
         let level = match self.settings.max_bounces {
-            Some(most) if leg.mirrors >= most => return,
-            Some(most) if self.shape.levels > 1 => (most - leg.mirrors - 1) as usize,
+            Some(most) if state.mirrors >= most => return,
+            Some(most) if self.shape.levels > 1 => (most - state.mirrors - 1) as usize,
             _ => 0,
         };
         if diffuse.iter().all(|&d| d == 0.0) {
@@ -684,15 +703,15 @@ impl Solved<'_> {
         let (unknown, local) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
         let level = level.min(self.shape.levels.saturating_sub(1));
         let values = self.irradiance.part(self.shape.at(unknown, level));
-        let sunlit = self.sun_cosine(leg, surface, how, path);
-        let goes_on = self.goes_on(leg, surface, unknown, how.sample);
-        let thrown: &[f64] = if leg.onward.is_some() && !goes_on {
+        let sunlit = self.sun_cosine(state, surface, mode, path);
+        let goes_on = self.goes_on(state, surface, unknown, mode.sample);
+        let reflected_irradiance: &[f64] = if state.onward.is_some() && !goes_on {
             // rays from a point are many, and each meets another place: what images give its element on the mean does
             let side = surface.facet * self.scene.sides() + surface.side;
             self.images.mean(self.shape, side, (unknown, level))
         } else {
             if !self.images.slots.is_empty() {
-                self.add_images(leg, surface, how, to, path);
+                self.add_images(state, surface, mode, to, path);
             }
             &[]
         };
@@ -700,55 +719,61 @@ impl Solved<'_> {
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
-                let own = to.iter_mut().zip(leg.through.iter()).zip(diffuse);
-                own.enumerate().for_each(|(band, ((to, through), rho))| {
-                    *to += through * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
+                let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
+                own.enumerate().for_each(|(band, ((to, throughput), rho))| {
+                    *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
                 });
             }
             return;
         }
         let mut weight = 0.0;
-        for (through, rho) in leg.through.iter().zip(diffuse) {
-            weight = f64::max(weight, through * rho);
+        for (throughput, rho) in state.throughput.iter().zip(diffuse) {
+            weight = f64::max(weight, throughput * rho);
         }
         let mut variance = f64::from(self.variance.at(unknown));
         let mut correction: &[f64] = &[];
-        if let Some(gathered) = leg.gathered.as_deref_mut()
-            && self.is_crowded(surface, unknown, leg.far, &mut gathered.surroundings)
+        if let Some(gathered) = state.gathered.as_deref_mut()
+            && self.has_fine_detail_nearby(surface, unknown, state.far, &mut gathered.details)
         {
             variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
         let by_element = self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance);
         let looks = self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element);
-        let open = match leg.gathered.as_deref_mut() {
-            Some(kept) if looks => self.open_in_pixel(surface, unknown, local, &mut kept.skies, how.outlook),
+        let open = match state.gathered.as_deref_mut() {
+            Some(kept) if looks => {
+                self.open_in_pixel(surface, unknown, local, &mut kept.skies, mode.occluders)
+            }
             _ => None,
         };
         variance += if open.is_some() { 0.0 } else { by_element };
         if self.wants_rays(surface, weight, variance)
-            && let Some(gathered) = leg.gathered.as_deref_mut()
+            && let Some(gathered) = state.gathered.as_deref_mut()
         {
             let open = open.as_ref();
-            let spot = Spot { surface, unknown, values, local, weight, bounces: leg.mirrors, open };
-            if let Some((near, left)) = self.gather(&spot, leg.images, gathered, how, path) {
+            let gather_point =
+                GatherPoint { surface, unknown, values, local, weight, bounces: state.mirrors, open };
+            if let Some((near, left)) = self.gather(&gather_point, state.images, gathered, mode, path) {
                 (correction, variance) = (near, left);
             }
         }
         variance += open.as_ref().map_or(0.0, |open| open.variance);
-        for (band, ((to, through), rho)) in to.iter_mut().zip(leg.through.iter()).zip(diffuse).enumerate() {
+        for (band, ((to, throughput), rho)) in
+            to.iter_mut().zip(state.throughput.iter()).zip(diffuse).enumerate()
+        {
             let mut irradiance = held(values, bands, local, open.as_ref(), band);
             irradiance = (irradiance + correction.at(band)).max(0.0);
-            irradiance += open.as_ref().map_or(0.0, |open| open.irradiance.at(band)) + thrown.at(band);
+            irradiance +=
+                open.as_ref().map_or(0.0, |open| open.irradiance.at(band)) + reflected_irradiance.at(band);
             if sunlit > 0.0
                 && let Some(sun) = &self.light.sun
             {
                 irradiance += sunlit * sun.irradiance(band);
             }
-            let share = through * rho;
+            let share = throughput * rho;
             *to += share * FRAC_1_PI * irradiance;
         }
         path.variance += weight * weight * variance;
-        if leg.gathered.is_none() {
+        if state.gathered.is_none() {
             // a ray from a point, or of a lobe
             let error = weight * sqrt(variance);
             path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);

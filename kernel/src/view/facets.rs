@@ -26,12 +26,13 @@ pub fn side(
     for unknown in solved.elements.unknowns_of(facet, side) {
         let mean = solved.irradiance.get(shape.at(unknown, level)).unwrap_or(&[]);
         // what lies inside a body receives nothing
-        let share = solved.elements.share(unknown) * f64::from(coupling.row(unknown).exposed);
+        let share = solved.elements.share(unknown) * f64::from(coupling.row(unknown).visible_share);
         let lit = sun.get(unknown).copied().unwrap_or(0.0);
-        let thrown = solved.images.mean(shape, solved.elements.facet_side(unknown), (unknown, level));
+        let reflected_irradiance =
+            solved.images.mean(shape, solved.elements.facet_side(unknown), (unknown, level));
         for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
             let sun = solved.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
-            *e += (m + thrown.get(band).copied().unwrap_or(0.0) + lit * sun) * share;
+            *e += (m + reflected_irradiance.get(band).copied().unwrap_or(0.0) + lit * sun) * share;
         }
     }
     let material = scene.material(facet);

@@ -1,6 +1,6 @@
 //! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
 
-mod lines;
+mod line_integral;
 mod thin;
 
 use crate::base::arena::{Arena, Need, plain_table};
@@ -14,10 +14,10 @@ use crate::rays::outline::Candidates;
 use crate::rays::ray::{Hit, Line, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::{Camera, Sampling};
-use crate::view::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
+use crate::view::chain::{ChainScratch, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
 use crate::view::raster::{Items, NO_FACET_DRAWN, UNSURE};
 use core::ops::Range;
-use lines::{Fineness, Measure, integrate};
+use line_integral::{Fineness, Measure, integrate};
 
 /// What was done on a range of rows; ranges add up with [`Tally::add`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,7 +75,7 @@ pub struct Target<'o> {
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let width = camera.columns() + 2;
     let need = Need::new().and::<f64>(3 * width * (3 * bands + PIXEL_NOTES)).and::<f64>(work(bands));
-    let need = need.and::<Board>(1).and::<Way>(Outlook::ROOM);
+    let need = need.and::<PixelScratch>(1).and::<Occluders>(OccluderCache::ROOM);
     Candidates::need(Items::need(need, width, DRAWN), CANDIDATE_FACETS_KEPT).bytes()
 }
 
@@ -96,7 +96,7 @@ const DRAWN_FACETS_PER_PIXEL: usize = 2;
 
 /// Values of two nested integrals and the result.
 fn work(bands: usize) -> usize {
-    2 * lines::memory(3 * bands) + 3 * bands
+    2 * line_integral::memory(3 * bands) + 3 * bands
 }
 
 /// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
@@ -174,11 +174,12 @@ pub fn rows(
     let width = camera.columns() + 2;
     let stride = 3 * bands + PIXEL_NOTES;
     let area = camera.sampling() == Sampling::Area;
-    let lines = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
+    let centre_rows = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
     let work = arena.take::<f64>(work(bands))?;
-    let board = arena.take::<Board>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
-    board.work.gathered.start();
-    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let pixel =
+        arena.take::<PixelScratch>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+    pixel.work.gathered.start();
+    let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
     let items = Items::new(&mut arena, width, DRAWN)?;
     let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
     let draws = solved.bvh.is_own()
@@ -186,11 +187,11 @@ pub fn rows(
     let mut painter = Painter {
         solved,
         camera,
-        lines,
+        centre_rows,
         work,
         width,
         stride,
-        board,
+        pixel,
         beside: false,
         primary: Primary {
             items,
@@ -199,13 +200,13 @@ pub fn rows(
             last: range.end as isize + isize::from(area),
             line: None,
         },
-        outlook: Outlook::none(),
+        occluders: OccluderCache::none(),
         tally: Tally::default(),
     };
     if solved.bvh.is_own() {
-        painter.outlook = Outlook::new(ways, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
+        painter.occluders = OccluderCache::new(lists, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
     }
-    painter.outlook = painter.outlook.with_candidates(candidates);
+    painter.occluders = painter.occluders.with_candidates(candidates);
     if camera.is_parallel() {
         painter.look_beside();
     }
@@ -224,11 +225,11 @@ const PIXEL_MARGIN: f64 = 1e-6;
 
 plain_table! {
     /// A ray's terms and what following it takes, and the sums over scattered rays.
-    pub struct Board {
+    pub struct PixelScratch {
         /// Of the latest ray.
         pub terms: Terms,
         /// While it is followed.
-        pub work: Work,
+        pub work: ChainScratch,
         /// Sums over rays.
         pub sums: Terms,
         /// Sums of squares.
@@ -271,15 +272,15 @@ struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
     camera: &'a Camera,
     /// Three rows of pixel centres, with a column more on either side: three terms, then [`PIXEL_NOTES`].
-    lines: &'s mut [f64],
+    centre_rows: &'s mut [f64],
     work: &'s mut [f64],
     width: usize,
     stride: usize,
-    board: &'s mut Board,
-    /// Whether the latest pixel's centre shows the background, rather than the board's terms.
+    pixel: &'s mut PixelScratch,
+    /// Whether the latest pixel's centre shows the background, rather than [`PixelScratch::terms`].
     beside: bool,
     primary: Primary<'s>,
-    outlook: Outlook<'s>,
+    occluders: OccluderCache<'s>,
     tally: Tally,
 }
 
@@ -289,9 +290,9 @@ impl<'a> Painter<'a, '_> {
     fn look_beside(&mut self) {
         let ray = self.camera.ray(0.0, 0.0);
         self.primary.line = Line::new(&ray);
-        let Board { terms, work, background, .. } = &mut *self.board;
+        let PixelScratch { terms, work, background, .. } = &mut *self.pixel;
         work.gathered.forget();
-        self.solved.radiance_with((&ray, None), Sample::Alone(0), terms, work, &mut self.outlook);
+        self.solved.radiance_with((&ray, None), RaySample::Integrate(0), terms, work, &mut self.occluders);
         *background = *terms;
     }
 
@@ -300,7 +301,7 @@ impl<'a> Painter<'a, '_> {
         let columns = self.camera.columns();
         for (i, row) in range.enumerate() {
             self.line(row as isize, 0..columns as isize, |this, pixels, path| {
-                this.note(path.object, path.variance + path.noise * path.noise, path.tail);
+                this.count_pixel(path.object, path.variance + path.noise * path.noise, path.tail);
                 let terms = this.terms();
                 let first = i * columns + pixels.start as usize;
                 put(target, this.solved.shape.bands, first..first + pixels.len(), 1.0, |term, band| {
@@ -327,8 +328,8 @@ impl<'a> Painter<'a, '_> {
             for j in 0..columns {
                 let at = self.slot(row, j);
                 let [object, variance, tail] =
-                    [0, 1, 2].map(|i| self.lines.at(at + self.stride - PIXEL_NOTES + i));
-                self.note(object > 0.0, variance, tail);
+                    [0, 1, 2].map(|i| self.centre_rows.at(at + self.stride - PIXEL_NOTES + i));
+                self.count_pixel(object > 0.0, variance, tail);
                 if self.is_flat(at) && !beside {
                     self.write(target, index(j), at);
                     continue;
@@ -343,7 +344,7 @@ impl<'a> Painter<'a, '_> {
             for j in 0..columns {
                 let at = self.slot(row, j);
                 if self.is_flat(at) {
-                    self.err(at, 0.2 * self.lines.at(at + self.stride - 1));
+                    self.err(at, 0.2 * self.centre_rows.at(at + self.stride - 1));
                 }
             }
         }
@@ -362,11 +363,12 @@ impl<'a> Painter<'a, '_> {
         let error = self.refine(target, index, row, column, goal);
         self.err(at, error);
         // flat no more
-        self.lines.set(at + self.stride - 1, f64::INFINITY);
+        self.centre_rows.set(at + self.stride - 1, f64::INFINITY);
         let bands = self.solved.shape.bands;
         let values = target.image.part(index * bands..(index + 1) * bands);
         self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
-            let centre = [0, 1, 2].map(|term| self.lines.at(at + term * bands + band)).iter().sum::<f64>();
+            let centre =
+                [0, 1, 2].map(|term| self.centre_rows.at(at + term * bands + band)).iter().sum::<f64>();
             fabs(f64::from(*value) - f64::from(narrow(centre)))
                 > self.solved.settings.budget.flat_pixel * reference
         })
@@ -381,8 +383,8 @@ impl<'a> Painter<'a, '_> {
         for j in 0..columns {
             let value = self.unevenness(row, j);
             let end = self.slot(row, j) + self.stride;
-            self.lines.set(end - 1, value);
-            if self.lines.at(end - PIXEL_NOTES) > 0.0 {
+            self.centre_rows.set(end - 1, value);
+            if self.centre_rows.at(end - PIXEL_NOTES) > 0.0 {
                 object += 1.0;
                 uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
             }
@@ -393,25 +395,25 @@ impl<'a> Painter<'a, '_> {
     /// Whether a pixel keeps its centre's value.
     fn is_flat(&self, at: usize) -> bool {
         let end = at + self.stride;
-        let (sampled, uneven) = (self.lines.at(end - 2), self.lines.at(end - 1));
+        let (sampled, uneven) = (self.centre_rows.at(end - 2), self.centre_rows.at(end - 1));
         sampled == 0.0 && uneven <= self.solved.settings.budget.flat_pixel
     }
 
     /// Counts the error of an object pixel's area sampling.
     fn err(&mut self, at: usize, error: f64) {
-        if self.lines.at(at + self.stride - PIXEL_NOTES) > 0.0 {
+        if self.centre_rows.at(at + self.stride - PIXEL_NOTES) > 0.0 {
             self.tally.sampling2 += error * error;
         }
     }
 
-    /// Where a pixel's centre stands in the lines.
+    /// Where a pixel's centre stands in [`Painter::centre_rows`].
     #[inline]
     fn slot(&self, row: isize, column: isize) -> usize {
         slot(row, column, self.width, self.stride)
     }
 
-    /// Computes the centres of a row: `each` finds the terms of each range of pixels on the board, of pixel after pixel or
-    /// many of the background.
+    /// Computes the centres of a row: `each` takes the terms ([`Painter::terms`]) of each range of pixels, of one pixel or of
+    /// many that show the background.
     #[inline(never)]
     fn line(
         &mut self,
@@ -447,7 +449,7 @@ impl<'a> Painter<'a, '_> {
     /// The terms of the latest pixel's centre.
     #[inline]
     fn terms(&self) -> &Terms {
-        if self.beside { &self.board.background } else { &self.board.terms }
+        if self.beside { &self.pixel.background } else { &self.pixel.terms }
     }
 
     /// The ray through a pixel's centre.
@@ -481,32 +483,32 @@ impl<'a> Painter<'a, '_> {
         self.solved.bvh.closest_of(ahead, number(column), number(columns.end), any)
     }
 
-    /// Puts the terms of a pixel's centre on the board.
+    /// Follows the ray of a pixel's centre; its terms are left in [`PixelScratch::terms`].
     #[inline]
     fn follow(&mut self, ray: &Ray, hit: Option<Hit>, row: isize, column: isize) -> Path {
         let seed = hash2(row as u32, column as u32);
         let sample = match self.camera.sampling() {
-            Sampling::Centre => Sample::Alone(seed),
-            Sampling::Area => Sample::Glance(seed),
+            Sampling::Centre => RaySample::Integrate(seed),
+            Sampling::Area => RaySample::Probe(seed),
         };
-        let Board { terms, work, .. } = &mut *self.board;
+        let PixelScratch { terms, work, .. } = &mut *self.pixel;
         work.gathered.forget();
         terms.clear(self.solved.shape.bands);
-        let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.outlook);
+        let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.occluders);
         self.tally.chain += u64::from(path.rays);
         path
     }
 
-    /// Keeps what is on the board as the centres of pixels in the lines.
+    /// Stores the latest terms as those of the centres of pixels in [`Painter::centre_rows`].
     fn keep(&mut self, row: isize, pixels: Range<isize>, path: &Path) {
         let bands = self.solved.shape.bands;
-        let Board { terms, background, .. } = &*self.board;
+        let PixelScratch { terms, background, .. } = &*self.pixel;
         let terms = if self.beside { background } else { terms };
         let variance = path.variance + path.noise * path.noise;
         let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
         for column in pixels {
             let at = slot(row, column, self.width, self.stride);
-            let slot = self.lines.part_mut(at..at + self.stride);
+            let slot = self.centre_rows.part_mut(at..at + self.stride);
             copy(slot.part_mut(0..bands), &terms.diffuse);
             copy(slot.part_mut(bands..2 * bands), &terms.mirror_sky);
             copy(slot.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
@@ -518,7 +520,7 @@ impl<'a> Painter<'a, '_> {
     }
 
     /// Counts an object pixel and its expected errors.
-    fn note(&mut self, object: bool, variance: f64, tail: f64) {
+    fn count_pixel(&mut self, object: bool, variance: f64, tail: f64) {
         if object {
             self.tally.object_pixels += 1;
             self.tally.noise2 += variance;
@@ -529,7 +531,7 @@ impl<'a> Painter<'a, '_> {
     /// Writes a pixel's centre.
     fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
         let bands = self.solved.shape.bands;
-        let slot = self.lines.part(at..at + 3 * bands);
+        let slot = self.centre_rows.part(at..at + 3 * bands);
         put(target, bands, index..index + 1, 1.0, |term, band| slot.at(term * bands + band));
     }
 
@@ -537,7 +539,9 @@ impl<'a> Painter<'a, '_> {
     /// radiance.
     fn unevenness(&self, row: isize, column: isize) -> f64 {
         let measure = self.measure();
-        let centre = |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+        let centre = |i: isize, j: isize| {
+            self.centre_rows.part(self.slot(row + i, column + j)..self.centre_rows.len())
+        };
         let mut largest: f64 = 0.0;
         for (i, j) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
             let [before, here, after] = [centre(-i, -j), centre(0, 0), centre(i, j)];
@@ -556,14 +560,14 @@ impl<'a> Painter<'a, '_> {
     /// meet them.
     #[inline(never)]
     fn look_about(&mut self, row: isize, column: isize) {
-        self.board.work.gathered.forget();
+        self.pixel.work.gathered.forget();
         for (x, y) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25)] {
             let ray = self.camera.ray(column as f64 + x, row as f64 + y);
             let hit = self.solved.bvh.closest(&ray);
-            let sample = Sample::Glance(hash2(row as u32, column as u32));
-            let Board { terms, work, .. } = &mut *self.board;
+            let sample = RaySample::Probe(hash2(row as u32, column as u32));
+            let PixelScratch { terms, work, .. } = &mut *self.pixel;
             terms.clear(self.solved.shape.bands);
-            let path = self.solved.radiance_with((&ray, hit), sample, terms, work, &mut self.outlook);
+            let path = self.solved.radiance_with((&ray, hit), sample, terms, work, &mut self.occluders);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
             if work.gathered.is_empty() {
@@ -582,8 +586,9 @@ impl<'a> Painter<'a, '_> {
         let measure = self.measure();
         let (mut along, mut down) = (0.0, 0.0);
         for i in -1..=1 {
-            let centre =
-                |i: isize, j: isize| self.lines.part(self.slot(row + i, column + j)..self.lines.len());
+            let centre = |i: isize, j: isize| {
+                self.centre_rows.part(self.slot(row + i, column + j)..self.centre_rows.len())
+            };
             for j in -1..=1 {
                 sampled |= centre(i, j).at(self.stride - 2) > 0.0;
             }
@@ -616,10 +621,10 @@ impl<'a> Painter<'a, '_> {
     ) -> Option<f64> {
         let (solved, camera, measure) = (self.solved, self.camera, self.measure());
         let stride = measure.stride();
-        let Painter { work, board, outlook, tally, .. } = self;
-        let (terms, chain) = (&mut board.terms, &mut board.work);
-        let (outer, rest) = work.split_at_mut_checked(lines::memory(stride))?;
-        let (inner, out) = rest.split_at_mut_checked(lines::memory(stride))?;
+        let Painter { work, pixel, occluders, tally, .. } = self;
+        let (terms, chain) = (&mut pixel.terms, &mut pixel.work);
+        let (outer, rest) = work.split_at_mut_checked(line_integral::memory(stride))?;
+        let (inner, out) = rest.split_at_mut_checked(line_integral::memory(stride))?;
         let seed = hash2(row as u32, column as u32);
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
@@ -638,7 +643,7 @@ impl<'a> Painter<'a, '_> {
                 let ray = camera.ray(column as f64 + x, row as f64 + y);
                 terms.clear(measure.bands);
                 let hit = solved.bvh.closest(&ray);
-                let path = solved.radiance_with((&ray, hit), Sample::Glance(seed), terms, chain, outlook);
+                let path = solved.radiance_with((&ray, hit), RaySample::Probe(seed), terms, chain, occluders);
                 tally.primary += 1;
                 tally.chain += u64::from(path.rays);
                 let (diffuse, rest) = slot.split_at_mut_checked(measure.bands)?;
@@ -652,7 +657,7 @@ impl<'a> Painter<'a, '_> {
         let mut places = [0.0; PIXEL_PARTS.1 + 1];
         let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: NARROWEST.0 };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
-        let out = self.work.part(2 * lines::memory(stride)..self.work.len());
+        let out = self.work.part(2 * line_integral::memory(stride)..self.work.len());
         put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
         Some(LINE_ERROR_FACTOR * sqrt(error2))
     }
@@ -670,8 +675,8 @@ impl<'a> Painter<'a, '_> {
         let bands = self.solved.shape.bands;
         let seed = hash2(row as u32, column as u32);
         let sequence = Sequence::new(seed);
-        self.board.sums.clear(bands);
-        self.board.squares.head_mut(bands).fill(0.0);
+        self.pixel.sums.clear(bands);
+        self.pixel.squares.head_mut(bands).fill(0.0);
         let (mut n, mut goal) = (0u32, SCATTER_RAYS_FEWEST);
         let (mut error, mut glare, mut ahead) = (0.0, 0.0f64, AnswerBuffer::default());
         while n < goal {
@@ -682,14 +687,14 @@ impl<'a> Painter<'a, '_> {
             };
             let ray = any(n);
             let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
-            self.board.terms.clear(bands);
-            let of = Sample::OneOf { seed, index: n };
-            let Board { terms, work, .. } = &mut *self.board;
-            let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.outlook);
+            self.pixel.terms.clear(bands);
+            let of = RaySample::Stratum { seed, index: n };
+            let PixelScratch { terms, work, .. } = &mut *self.pixel;
+            let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.occluders);
             glare = glare.max(path.glare);
             self.tally.primary += 1;
             self.tally.chain += u64::from(path.rays);
-            let Board { terms, sums, squares, .. } = &mut *self.board;
+            let PixelScratch { terms, sums, squares, .. } = &mut *self.pixel;
             sums.add(terms, bands);
             for (band, square) in squares.iter_mut().enumerate().take(bands) {
                 *square += terms.sum(band) * terms.sum(band);
@@ -715,7 +720,7 @@ impl<'a> Painter<'a, '_> {
                 }
             }
         }
-        let sums = &self.board.sums;
+        let sums = &self.pixel.sums;
         let all = [&sums.diffuse, &sums.mirror_sky, &sums.mirror_diffuse];
         put(target, bands, index..index + 1, 1.0 / f64::from(n), |term, band| {
             all.get(term).map_or(0.0, |values| values.at(band))

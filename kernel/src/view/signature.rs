@@ -14,7 +14,7 @@ use crate::rays::bvh::AnswerBuffer;
 use crate::rays::ray::{Hit, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::Camera;
-use crate::view::chain::{Outlook, Path, Sample, Solved, Terms, Way, Work};
+use crate::view::chain::{ChainScratch, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
 use crate::view::raster::{Lines, Samples, Span};
 use core::ops::Range;
 use glints::Glints;
@@ -175,7 +175,11 @@ const GAP: f64 = 1e-9;
 
 /// Bytes of scratch memory for [`rows`] and [`whole`].
 pub fn scratch_bytes() -> Result<usize, Error> {
-    let need = Need::new().and::<Sums>(2).and::<Terms>(1).and::<Work>(1).and::<Way>(Outlook::ROOM);
+    let need = Need::new()
+        .and::<Sums>(2)
+        .and::<Terms>(1)
+        .and::<ChainScratch>(1)
+        .and::<Occluders>(OccluderCache::ROOM);
     Lines::need(need, SIGNATURE_ROWS_TOGETHER).bytes()
 }
 
@@ -224,14 +228,15 @@ fn each_row<'s>(
     let short = Error::BufferTooSmall { needed, given };
     let [all, sums] = arena.take::<Sums>(2)? else { return Err(short) };
     let terms = arena.take::<Terms>(1)?.first_mut().ok_or(short)?;
-    let work = arena.take::<Work>(1)?.first_mut().ok_or(short)?;
-    let ways = arena.take::<Way>(Outlook::ROOM)?;
+    let work = arena.take::<ChainScratch>(1)?.first_mut().ok_or(short)?;
+    let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
     let mut lines = Lines::new(&mut arena, SIGNATURE_ROWS_TOGETHER)?;
     let own = solved.bvh.is_own();
-    let outlook = if own { Outlook::new(ways, true, view.cell_area, 1.0) } else { Outlook::none() };
+    let occluders =
+        if own { OccluderCache::new(lists, true, view.cell_area, 1.0) } else { OccluderCache::none() };
     let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
     let solved = &Solved { settings: solved.settings.of_sums(), ..*solved };
-    let mut tracer = Tracer { solved, view, area, terms, work, outlook };
+    let mut tracer = Tracer { solved, view, area, terms, work, occluders };
     let flat = view.cell_area == 0.0;
     let samples = !own || flat || solved.scene.facets() / DRAWN_FACETS_PER_CELL > view.cells * view.cells;
     let (mut next, end) = (range.start, range.end);
@@ -262,8 +267,8 @@ struct Tracer<'a> {
     /// Of a cell, in the caller's square units.
     area: f64,
     terms: &'a mut Terms,
-    work: &'a mut Work,
-    outlook: Outlook<'a>,
+    work: &'a mut ChainScratch,
+    occluders: OccluderCache<'a>,
 }
 
 impl Tracer<'_> {
@@ -349,9 +354,9 @@ impl Tracer<'_> {
         if hit.is_none() {
             return Path::default();
         }
-        let sample = Sample::OneOf { seed: row as u32, index };
-        let (seen, outlook) = ((ray, hit), &mut self.outlook);
-        let path = self.solved.radiance_with(seen, sample, self.terms, self.work, outlook);
+        let sample = RaySample::Stratum { seed: row as u32, index };
+        let (seen, occluders) = ((ray, hit), &mut self.occluders);
+        let path = self.solved.radiance_with(seen, sample, self.terms, self.work, occluders);
         sums.rays += u64::from(path.rays);
         path
     }

@@ -89,7 +89,7 @@ impl<'a> Lanes<'a> {
         Lanes { facets, used: 0, spare: live }
     }
 
-    /// The child that stands for the leaf of these facets, at most [`PACKET_LANES`](super::PACKET_LANES). The other facets of its packets, where
+    /// The child that stands for the leaf of these facets, at most [`PACKET_LANES`]. The other facets of its packets, where
     /// there are any, are tested along with it, which changes no hit.
     fn place<'f>(&mut self, leaf: impl ExactSizeIterator<Item = &'f u32>) -> u32 {
         let (start, count) = (self.used % PACKET_LANES, leaf.len());

@@ -10,7 +10,7 @@
 //! contact lines, where a body is pierced by another. The ray goes on diffusely from there, as paths do, until it is not.
 
 use super::straight::KeptSkies;
-use super::{How, Leg, OpenAt, Path, SIGNS, Sample, Solved, Surroundings, Terms, held};
+use super::{DetailCache, Mode, OpenAt, Path, PathState, RaySample, SIGNS, Solved, Terms, held};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{PI, Vec3, clamp, frame, pow, sqrt};
@@ -82,7 +82,7 @@ plain_table! {
         /// Of the latest ray.
         pub terms: [Terms; GATHERS as usize],
         /// Product of the reflectances along it.
-        pub through: [[f64; MAX_BANDS]; GATHERS as usize],
+        pub throughput: [[f64; MAX_BANDS]; GATHERS as usize],
         /// The same from where it goes on diffusely.
         pub onward: [[f64; MAX_BANDS]; GATHERS as usize],
         /// The sky in its direction.
@@ -106,7 +106,7 @@ plain_table! {
         /// The straight sky at points of elements.
         pub skies: KeptSkies,
         /// What stands about the latest element; none at first.
-        pub surroundings: Surroundings,
+        pub details: DetailCache,
     }
 }
 
@@ -114,7 +114,7 @@ impl Gathered {
     /// All zero.
     pub const ZERO: Gathered = Gathered {
         terms: [Terms::ZERO; GATHERS as usize],
-        through: [[0.0; MAX_BANDS]; GATHERS as usize],
+        throughput: [[0.0; MAX_BANDS]; GATHERS as usize],
         onward: [[0.0; MAX_BANDS]; GATHERS as usize],
         sky: [0.0; BANDS],
         beyond: [[0.0; BANDS]; GATHER_SETS],
@@ -126,12 +126,12 @@ impl Gathered {
         hits: 0,
         count: 0,
         skies: KeptSkies::ZERO,
-        surroundings: Surroundings::ZERO,
+        details: DetailCache::ZERO,
     };
 
     /// Another image begins.
     pub(crate) fn start(&mut self) {
-        self.surroundings = Surroundings::ZERO;
+        self.details = DetailCache::ZERO;
     }
 
     /// Another pixel begins.
@@ -224,7 +224,7 @@ pub(super) struct Onward<'w> {
 }
 
 /// The point of which is asked what arrives there.
-pub(super) struct Spot<'a> {
+pub(super) struct GatherPoint<'a> {
     pub surface: &'a Surface,
     pub unknown: usize,
     /// Irradiance of its element, mean and gradients, and where on it the point is.
@@ -274,23 +274,23 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn gather<'g>(
         &self,
-        spot: &Spot<'_>,
+        gather_point: &GatherPoint<'_>,
         images: &mut [[f64; MAX_BANDS]; 2],
         gathered: &'g mut Gathered,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         path: &mut Path,
     ) -> Option<(&'g [f64], f64)> {
-        let place = match gathered.find(spot.unknown) {
+        let place = match gathered.find(gather_point.unknown) {
             Some(place) => place,
             None => {
                 let place = gathered.count as usize;
                 if place >= PIXEL_ELEMENTS_KEPT {
                     return None;
                 }
-                let (exact, rays) = self.trace(spot, images, gathered, how, path)?;
-                let error = self.note(spot, gathered, place, exact, rays);
+                let (exact, rays) = self.trace(gather_point, images, gathered, mode, path)?;
+                let error = self.store_correction(gather_point, gathered, place, exact, rays);
                 gathered.errors.set(place, error);
-                gathered.unknowns.set(place, spot.unknown as u64);
+                gathered.unknowns.set(place, gather_point.unknown as u64);
                 gathered.count = place as u64 + 1;
                 place
             }
@@ -301,23 +301,26 @@ impl Solved<'_> {
     /// Traces rays from a point until their parts agree; whether the exact sky serves better than theirs, and their number.
     fn trace(
         &self,
-        spot: &Spot<'_>,
+        gather_point: &GatherPoint<'_>,
         images: &mut [[f64; MAX_BANDS]; 2],
         gathered: &mut Gathered,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         path: &mut Path,
     ) -> Option<(bool, u32)> {
         // by where on its facet the point is, to some digits: a mesh that is moved keeps its rays
-        let Surface { facet, side, u, v, .. } = *spot.surface;
+        let Surface { facet, side, u, v, .. } = *gather_point.surface;
         let [u, v] = [u, v].map(|x| (x * 65536.0) as u32);
         let seed = hash2((facet * 2 + side) as u32, hash2(u, v));
         let sequence = Sequence::new(seed);
-        let axes = frame(spot.surface.normal);
-        let tolerance = self.settings.budget.image / spot.weight;
+        let axes = frame(gather_point.surface.normal);
+        let tolerance = self.settings.budget.image / gather_point.weight;
         let goal = (GOAL * tolerance) * (GOAL * tolerance);
-        let fewest = if spot.open.is_some() { GATHER_RAYS_FEWEST.0 } else { GATHER_RAYS_FEWEST.1 };
-        let least =
-            clamp(LEAST_TIMES * usual_rays(tolerance / self.spread_at(spot)), fewest, GATHER_RAYS_MOST);
+        let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST.0 } else { GATHER_RAYS_FEWEST.1 };
+        let least = clamp(
+            LEAST_TIMES * usual_rays(tolerance / self.spread_at(gather_point)),
+            fewest,
+            GATHER_RAYS_MOST,
+        );
         let most = clamp(GATHER_RAYS_FACTOR_MOST * usual_rays(tolerance), fewest, GATHER_RAYS_MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
         gathered.sky.fill(0.0);
@@ -329,11 +332,11 @@ impl Solved<'_> {
             for index in done..rays {
                 let (p, q) = sequence.pair(index, 0);
                 let (a, b, c) = cosine_direction(p, q);
-                let direction = axes.0 * a + axes.1 * b + spot.surface.normal * c;
+                let direction = axes.0 * a + axes.1 * b + gather_point.surface.normal * c;
                 let part = (u64::from(index) * GATHER_SETS as u64 / u64::from(rays)) as usize;
-                let sample = Sample::OneOf { seed, index };
-                let mut how = How { sample, outlook: &mut *how.outlook, branches: false };
-                self.add_direction((spot, direction), part, images, gathered, &mut how, path)?;
+                let sample = RaySample::Stratum { seed, index };
+                let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false };
+                self.add_direction((gather_point, direction), part, images, gathered, &mut mode, path)?;
             }
             let [exact, plain] = [true, false].map(|exact| gathered.error(self.reference, rays, exact));
             if exact.min(plain) <= goal || 2 * rays > most {
@@ -346,11 +349,12 @@ impl Solved<'_> {
 
     /// Standard deviation of a ray from a point over that where half of a hemisphere is bright: where the straight sky is
     /// known, of what is met, which the element tells about, whether it is met or not.
-    fn spread_at(&self, spot: &Spot<'_>) -> f64 {
-        let Some(open) = spot.open else { return RAY_SPREAD.1 };
+    fn spread_at(&self, gather_point: &GatherPoint<'_>) -> f64 {
+        let Some(open) = gather_point.open else { return RAY_SPREAD.1 };
         let (bands, blocked) = (self.shape.bands, (1.0 - open.share).max(f64::MIN_POSITIVE));
         let of = |(band, reference): (usize, &f64)| {
-            let met = held(spot.values, bands, spot.local, spot.open, band) / (PI * blocked);
+            let met = held(gather_point.values, bands, gather_point.local, gather_point.open, band)
+                / (PI * blocked);
             if *reference > 0.0 { met / reference } else { 0.0 }
         };
         let met = self.reference.iter().enumerate().map(of).fold(0.0, f64::max);
@@ -362,21 +366,22 @@ impl Solved<'_> {
     /// One more ray from a point.
     fn add_direction(
         &self,
-        (spot, direction): (&Spot<'_>, Vec3),
+        (gather_point, direction): (&GatherPoint<'_>, Vec3),
         part: usize,
         images: &mut [[f64; MAX_BANDS]; 2],
         gathered: &mut Gathered,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         path: &mut Path,
     ) -> Option<()> {
         let bands = self.shape.bands;
-        let ray = spot.surface.leave(direction);
+        let ray = gather_point.surface.spawn_ray(direction);
         let mut hit = self.bvh.closest(&ray);
         path.rays += 1;
-        let Gathered { terms, through, onward, sky, beyond, open, carried, hits, .. } = gathered;
-        let (terms, through, throughput) = (terms.first_mut()?, through.first_mut()?, onward.first_mut()?);
+        let Gathered { terms, throughput, onward, sky, beyond, open, carried, hits, .. } = gathered;
+        let (terms, throughput, onward_throughput) =
+            (terms.first_mut()?, throughput.first_mut()?, onward.first_mut()?);
         let (beyond, open) = (beyond.get_mut(part)?, open.get_mut(part)?);
-        if let (None, Some(light)) = (spot.open, &self.light.sky) {
+        if let (None, Some(light)) = (gather_point.open, &self.light.sky) {
             light.radiance(direction, sky.head_mut(bands));
             open.iter_mut().zip(&*sky).take(bands).for_each(|(sum, l)| *sum += l);
         }
@@ -385,11 +390,11 @@ impl Solved<'_> {
         }
         *hits += 1;
         terms.clear(bands);
-        through.head_mut(bands).fill(1.0);
-        let mut leg = Leg {
+        throughput.head_mut(bands).fill(1.0);
+        let mut state = PathState {
             ray,
-            through,
-            mirrors: spot.bounces + 1,
+            throughput,
+            mirrors: gather_point.bounces + 1,
             lobes: 0,
             lobe: false,
             imaged: false,
@@ -398,15 +403,15 @@ impl Solved<'_> {
             images,
             gathered: None,
             step: 0.0,
-            onward: Some(Onward { throughput, ray: None, bounces: 0, depth: 0 }),
+            onward: Some(Onward { throughput: onward_throughput, ray: None, bounces: 0, depth: 0 }),
         };
         let mut inner = Path::default();
         loop {
-            self.follow(&mut leg, hit, how, terms, &mut inner);
-            let Some(onward) = leg.onward.as_mut() else { break };
+            self.follow(&mut state, hit, mode, terms, &mut inner);
+            let Some(onward) = state.onward.as_mut() else { break };
             let Some(ray) = onward.ray.take() else { break };
-            core::mem::swap(&mut leg.through, &mut onward.throughput);
-            (leg.ray, leg.mirrors, leg.lobes, leg.lobe) = (ray, onward.bounces, 0, false);
+            core::mem::swap(&mut state.throughput, &mut onward.throughput);
+            (state.ray, state.mirrors, state.lobes, state.lobe) = (ray, onward.bounces, 0, false);
             onward.depth += 1;
             inner.rays += 1;
             hit = self.bvh.closest(&ray);
@@ -423,21 +428,23 @@ impl Solved<'_> {
     /// there: then the next ray is noted.
     pub(super) fn goes_on(
         &self,
-        leg: &mut Leg<'_>,
+        state: &mut PathState<'_>,
         surface: &Surface,
         unknown: usize,
-        sample: Sample,
+        sample: RaySample,
     ) -> bool {
-        let (Some(onward), Sample::OneOf { seed, index }) = (&mut leg.onward, sample) else { return false };
+        let (Some(onward), RaySample::Stratum { seed, index }) = (&mut state.onward, sample) else {
+            return false;
+        };
         let area = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
         if onward.ray.is_some()
             || onward.depth >= MOST_ONWARD
-            || leg.step * leg.step > ONWARD_SIZE_MOST * ONWARD_SIZE_MOST * area
+            || state.step * state.step > ONWARD_SIZE_MOST * ONWARD_SIZE_MOST * area
         {
             return false;
         }
         // the first along with the ray's own direction, coordinates 0 and 1; lobes have taken these
-        let (u, v) = if onward.depth == 0 && leg.lobes == 0 {
+        let (u, v) = if onward.depth == 0 && state.lobes == 0 {
             Sequence::new(seed).pair(index, 4)
         } else {
             Sequence::new(hash2(seed, 0x0d1f_f000 + onward.depth))
@@ -445,23 +452,34 @@ impl Solved<'_> {
         };
         let (x, y) = frame(surface.normal);
         let (a, b, c) = cosine_direction(u, v);
-        onward.ray = Some(surface.leave(x * a + y * b + surface.normal * c));
-        onward.bounces = leg.mirrors + 1;
+        onward.ray = Some(surface.spawn_ray(x * a + y * b + surface.normal * c));
+        onward.bounces = state.mirrors + 1;
         let diffuse = self.scene.diffuse(surface.material);
-        let own = onward.throughput.iter_mut().zip(leg.through.iter()).zip(diffuse);
-        own.for_each(|((next, through), rho)| *next = through * rho);
+        let own = onward.throughput.iter_mut().zip(state.throughput.iter()).zip(diffuse);
+        own.for_each(|((next, throughput), rho)| *next = throughput * rho);
         true
     }
 
     /// Notes the correction that rays from a point tell, and returns the expected squared error that is left.
-    fn note(&self, spot: &Spot<'_>, gathered: &mut Gathered, place: usize, exact: bool, rays: u32) -> f64 {
+    fn store_correction(
+        &self,
+        gather_point: &GatherPoint<'_>,
+        gathered: &mut Gathered,
+        place: usize,
+        exact: bool,
+        rays: u32,
+    ) -> f64 {
         let bands = self.shape.bands.min(BANDS);
         gathered.sky.fill(0.0);
-        if let (true, None, Some(sky)) = (exact, spot.open, &self.light.sky) {
-            sky.irradiance(spot.surface.normal, self.settings.budget.sky, gathered.sky.head_mut(bands));
+        if let (true, None, Some(sky)) = (exact, gather_point.open, &self.light.sky) {
+            sky.irradiance(
+                gather_point.surface.normal,
+                self.settings.budget.sky,
+                gathered.sky.head_mut(bands),
+            );
         }
         // what is met is known to fill what is not open
-        let scale = match spot.open {
+        let scale = match gather_point.open {
             Some(open) if gathered.hits > 0 => (1.0 - open.share) * f64::from(rays) / gathered.hits as f64,
             _ => 1.0,
         };
@@ -469,7 +487,11 @@ impl Solved<'_> {
             let (mean, _) = gathered.mean(band, rays, exact);
             let irradiance = PI * scale * mean + gathered.sky.at(band);
             if let Some(corrections) = gathered.corrections.get_mut(place) {
-                corrections.set(band, irradiance - held(spot.values, bands, spot.local, spot.open, band));
+                corrections.set(
+                    band,
+                    irradiance
+                        - held(gather_point.values, bands, gather_point.local, gather_point.open, band),
+                );
             }
         }
         let [apart @ .., alike] =

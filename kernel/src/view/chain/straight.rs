@@ -1,7 +1,7 @@
 //! The sky that a point sees straight, by outlines, in place of what its element holds of it.
 
 use super::gather::{BANDS, PIXEL_ELEMENTS_KEPT, find};
-use super::{Outlook, Solved, linear};
+use super::{OccluderCache, Solved, linear};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{clamp, fabs};
@@ -71,7 +71,7 @@ impl<'a> Solved<'a> {
         unknown: usize,
         local: Local,
         kept: &mut KeptSkies,
-        outlook: &mut Outlook<'_>,
+        occluders: &mut OccluderCache<'_>,
     ) -> Option<OpenAt<'a>> {
         let bands = self.shape.bands.min(BANDS);
         if let Some(place) = kept.find(unknown) {
@@ -93,7 +93,7 @@ impl<'a> Solved<'a> {
                 variance,
             });
         }
-        let open = self.open_at(surface, unknown, local, outlook);
+        let open = self.open_at(surface, unknown, local, occluders);
         let place = kept.count as usize;
         if place < PIXEL_ELEMENTS_KEPT {
             kept.unknowns.set(place, unknown as u64);
@@ -128,7 +128,7 @@ impl<'a> Solved<'a> {
         surface: &Surface,
         unknown: usize,
         local: Local,
-        outlook: &mut Outlook<'_>,
+        occluders: &mut OccluderCache<'_>,
     ) -> Option<OpenAt<'a>> {
         let sky = self.light.sky.as_ref()?;
         let bands = self.shape.bands;
@@ -137,7 +137,7 @@ impl<'a> Solved<'a> {
             return None;
         }
         let basis = straight::basis(self.bvh, sky)?;
-        let candidates = &mut outlook.candidates;
+        let candidates = &mut occluders.candidates;
         if !candidates.prepare(self.scene, self.bvh, (surface.facet, surface.side)) {
             return None;
         }

@@ -1,11 +1,11 @@
 //! Sunlight on a point that a chain meets: straight, mirrored by flat facets, and in lobes.
 
-use super::outlook::{Toward, may_meet};
-use super::{How, Leg, Outlook, Path, Sample, Solved, Terms};
+use super::occluders::{RayKind, may_meet};
+use super::{Mode, OccluderCache, Path, PathState, RaySample, Solved, Terms};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
-use crate::coupling::word::MIRRORS_MOST;
+use crate::coupling::mirror_path::MIRRORS_MOST;
 use crate::radiosity::sun_image::{Image, SUN_DISTANCE_LEAST};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
@@ -35,9 +35,9 @@ impl Solved<'_> {
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn sun_cosine(
         &self,
-        leg: &Leg<'_>,
+        state: &PathState<'_>,
         surface: &Surface,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         path: &mut Path,
     ) -> f64 {
         let Some(sun) = &self.light.sun else { return 0.0 };
@@ -45,15 +45,15 @@ impl Solved<'_> {
         if cosine <= 0.0 {
             return 0.0;
         }
-        let known = how.outlook.before(self, surface, Toward::Sun, (sun.direction(), sun.half_angle()));
+        let known = mode.occluders.before(self, surface, RayKind::Sun, (sun.direction(), sun.half_angle()));
         if known.is_some_and(<[u32]>::is_empty) && surface.normal.dot(sun.direction()) > sun.half_angle() {
             // all of the disc is above the facet
             return cosine;
         }
-        let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
+        let at_stake = cosine * self.sun_at_stake(state, surface, sun);
         let mut lit = 0.0;
         let disc = Disc::OnPlane(sun, surface.normal);
-        let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+        let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
             let seen = self.sees_sun(surface, toward, known, path);
             lit += if seen { share } else { 0.0 };
             seen
@@ -63,7 +63,7 @@ impl Solved<'_> {
 
     /// Whether nothing stands before a point in a direction; `known` is all that may, if that is known.
     fn sees_sun(&self, surface: &Surface, toward: Vec3, known: Option<&[u32]>, path: &mut Path) -> bool {
-        let ray = surface.leave(toward);
+        let ray = surface.spawn_ray(toward);
         path.rays += u32::from(known.is_none_or(|k| !k.is_empty()));
         match known {
             Some([]) => true,
@@ -79,7 +79,7 @@ impl Solved<'_> {
         &self,
         disc: &Disc<'_>,
         at_stake: f64,
-        sample: Sample,
+        sample: RaySample,
         path: &mut Path,
         mut ray: impl FnMut(&mut Path, Vec3, f64) -> bool,
     ) -> f64 {
@@ -90,11 +90,11 @@ impl Solved<'_> {
         // other coordinates than those of the place in the pixel: the same ones of another sequence are correlated with
         // them bit by bit
         let (sequence, coordinate, mut count, mut goal) = match sample {
-            Sample::OneOf { seed, index } => (Sequence::new(seed), 2, index, index + 1),
-            Sample::Alone(seed) => {
+            RaySample::Stratum { seed, index } => (Sequence::new(seed), 2, index, index + 1),
+            RaySample::Integrate(seed) => {
                 (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.0))
             }
-            Sample::Glance(seed) => {
+            RaySample::Probe(seed) => {
                 (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.1))
             }
         };
@@ -110,7 +110,7 @@ impl Solved<'_> {
             if count == goal && lit != 0.0 && lit != all {
                 let part = lit / all;
                 let error = at_stake * sqrt(part * (1.0 - part)) * pow(f64::from(count), -0.75);
-                let alone = matches!(sample, Sample::Alone(_));
+                let alone = matches!(sample, RaySample::Integrate(_));
                 if alone && count < MOST_DISC_RAYS && error > self.settings.budget.image {
                     goal *= 2;
                 } else if !alone && error > SAMPLED * self.settings.budget.image {
@@ -134,11 +134,11 @@ impl Solved<'_> {
 
     /// What the sun brings to a chain by a facet that faces it, relative to the reference radiance.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
-    fn sun_at_stake(&self, leg: &Leg<'_>, surface: &Surface, sun: &Sun<'_>) -> f64 {
+    fn sun_at_stake(&self, state: &PathState<'_>, surface: &Surface, sun: &Sun<'_>) -> f64 {
         let diffuse = self.scene.diffuse(surface.material);
         let mut largest: f64 = 0.0;
         for (band, (rho, reference)) in diffuse.iter().zip(self.reference).enumerate() {
-            let value = FRAC_1_PI * rho * leg.through.at(band) * sun.irradiance(band);
+            let value = FRAC_1_PI * rho * state.throughput.at(band) * sun.irradiance(band);
             largest = if value > 0.0 { largest.max(value / reference) } else { largest };
         }
         largest
@@ -148,31 +148,31 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn add_images(
         &self,
-        leg: &mut Leg<'_>,
+        state: &mut PathState<'_>,
         surface: &Surface,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         to: &mut [f64; MAX_BANDS],
         path: &mut Path,
     ) {
         let Some(sun) = &self.light.sun else { return };
         let bands = self.shape.bands;
-        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors + 1));
-        let mut images = how.outlook.images(self, surface, sun.half_angle());
-        while let Some(one) = images.next(how.outlook) {
+        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors + 1));
+        let mut images = mode.occluders.images(self, surface, sun.half_angle());
+        while let Some(one) = images.next(mode.occluders) {
             let axis = one.axis;
             let image = sun.seen_toward(axis);
             let cosine = image.cosine(surface.normal);
             if cosine <= 0.0 {
                 continue;
             }
-            if !self.may_show(&one, surface, sun, how.outlook) {
+            if !self.may_show(&one, surface, sun, mode.occluders) {
                 continue;
             }
-            let at_stake = cosine * self.sun_at_stake(leg, surface, sun);
-            let [lit, products] = &mut *leg.images;
+            let at_stake = cosine * self.sun_at_stake(state, surface, sun);
+            let [lit, products] = &mut *state.images;
             lit.head_mut(bands).fill(0.0);
             let disc = Disc::OnPlane(&image, surface.normal);
-            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+            let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
                 let seen = self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
                 if seen {
                     lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
@@ -180,37 +180,43 @@ impl Solved<'_> {
                 seen
             });
             if all > 0.0 {
-                self.add_lit(leg, surface, (sun, cosine, all), to);
+                self.add_lit(state, surface, (sun, cosine, all), to);
             }
         }
     }
 
     /// Whether any mirror may show a point an image of the sun.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
-    fn may_show(&self, image: &Image, surface: &Surface, sun: &Sun<'_>, outlook: &mut Outlook<'_>) -> bool {
+    fn may_show(
+        &self,
+        image: &Image,
+        surface: &Surface,
+        sun: &Sun<'_>,
+        occluders: &mut OccluderCache<'_>,
+    ) -> bool {
         let axis = image.axis;
         let shows =
             |facet: usize| may_meet(&self.scene.corners().at(facet), surface.point, axis, sun.half_angle());
         if let Some(mut all) = image.mirrors.all() {
             return all.any(shows);
         }
-        let known = outlook.before(self, surface, Toward::Image(image.number), (axis, sun.half_angle()));
+        let known = occluders.before(self, surface, RayKind::Image(image.number), (axis, sun.half_angle()));
         known.is_none_or(|mirrors| mirrors.iter().any(|facet| shows(*facet as usize)))
     }
 
-    /// Adds what an image of the sun brings, of whose disc `leg.images` holds the lit share of `all`.
+    /// Adds what an image of the sun brings, of whose disc `state.images` holds the lit share of `all`.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn add_lit(
         &self,
-        leg: &Leg<'_>,
+        state: &PathState<'_>,
         surface: &Surface,
         (sun, cosine, all): (&Sun<'_>, f64, f64),
         to: &mut [f64; MAX_BANDS],
     ) {
         let diffuse = self.scene.diffuse(surface.material);
-        for (band, (to, (lit, rho))) in to.iter_mut().zip(leg.images[0].iter().zip(diffuse)).enumerate() {
+        for (band, (to, (lit, rho))) in to.iter_mut().zip(state.images[0].iter().zip(diffuse)).enumerate() {
             let irradiance = sun.irradiance(band) * cosine * (lit / all);
-            *to += leg.through.at(band) * rho * FRAC_1_PI * irradiance;
+            *to += state.throughput.at(band) * rho * FRAC_1_PI * irradiance;
         }
     }
 
@@ -225,7 +231,7 @@ impl Solved<'_> {
         products: &mut [f64; MAX_BANDS],
         path: &mut Path,
     ) -> bool {
-        let mut ray = from.leave(toward);
+        let mut ray = from.spawn_ray(toward);
         let mut mirrors = 0;
         products.head_mut(self.shape.bands).fill(1.0);
         loop {
@@ -256,7 +262,7 @@ impl Solved<'_> {
                 // what this mirror shows is no image of the sun
                 return false;
             }
-            ray = surface.leave(surface.mirrored(self.scene, ray.direction));
+            ray = surface.spawn_ray(surface.mirrored(self.scene, ray.direction));
         }
     }
 
@@ -264,47 +270,48 @@ impl Solved<'_> {
     #[inline(never)]
     pub(super) fn add_sun_gloss(
         &self,
-        leg: &mut Leg<'_>,
+        state: &mut PathState<'_>,
         surface: &Surface,
         mirror: &Mirror,
-        how: &mut How<'_, '_>,
+        mode: &mut Mode<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
     ) {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
-        let mirrored = surface.mirrored(self.scene, leg.ray.direction);
+        let mirrored = surface.mirrored(self.scene, state.ray.direction);
         let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
         let bands = self.shape.bands;
         if shows(sun) {
-            let known = how.outlook.before(self, surface, Toward::Sun, (sun.direction(), sun.half_angle()));
-            let [lit, _] = &mut *leg.images;
+            let known =
+                mode.occluders.before(self, surface, RayKind::Sun, (sun.direction(), sun.half_angle()));
+            let [lit, _] = &mut *state.images;
             lit.head_mut(bands).fill(0.0);
             let (disc, value) = Disc::of_lobe(lobe, mirrored, sun);
-            let at_stake = value * self.gloss_at_stake(leg.through, sun);
-            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+            let at_stake = value * self.gloss_at_stake(state.throughput, sun);
+            let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
                 let seen = toward.dot(surface.normal) > 0.0 && self.sees_sun(surface, toward, known, path);
                 lit.head_mut(bands).iter_mut().for_each(|sum| *sum += if seen { share } else { 0.0 });
                 seen
             });
-            self.add_highlight(leg, (sun, value, all), terms);
-            self.glare(leg, lobe, (value, at_stake), path);
+            self.add_highlight(state, (sun, value, all), terms);
+            self.glare(state, lobe, (value, at_stake), path);
         }
-        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(leg.mirrors));
-        let mut images = how.outlook.images(self, surface, sun.half_angle());
-        while let Some(one) = images.next(how.outlook) {
+        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
+        let mut images = mode.occluders.images(self, surface, sun.half_angle());
+        while let Some(one) = images.next(mode.occluders) {
             let axis = one.axis;
             let image = sun.seen_toward(axis);
             if !shows(&image) {
                 continue;
             }
-            if !self.may_show(&one, surface, sun, how.outlook) {
+            if !self.may_show(&one, surface, sun, mode.occluders) {
                 continue;
             }
-            let [lit, products] = &mut *leg.images;
+            let [lit, products] = &mut *state.images;
             lit.head_mut(bands).fill(0.0);
             let (disc, value) = Disc::of_lobe(lobe, mirrored, &image);
-            let at_stake = value * self.gloss_at_stake(leg.through, sun);
-            let all = self.over_disc(&disc, at_stake, how.sample, path, |path, toward, share| {
+            let at_stake = value * self.gloss_at_stake(state.throughput, sun);
+            let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
                 let seen = toward.dot(surface.normal) > 0.0
                     && self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
                 if seen {
@@ -312,37 +319,45 @@ impl Solved<'_> {
                 }
                 seen
             });
-            self.add_highlight(leg, (sun, value, all), terms);
-            self.glare(leg, lobe, (value, at_stake), path);
+            self.add_highlight(state, (sun, value, all), terms);
+            self.glare(state, lobe, (value, at_stake), path);
         }
     }
 
     /// Notes a highlight that other rays of a lobe may meet nearer to its middle. Directions in which it is brighter than
     /// some value are as many as the inverse of that, so that the brightest of n rays tells what the rest of it brings.
-    fn glare(&self, leg: &Leg<'_>, lobe: &Lobe, (value, brought): (f64, f64), path: &mut Path) {
-        if leg.lobes > 0 && value > 0.0 && leg.images[0].head(self.shape.bands).iter().any(|lit| *lit > 0.0) {
+    fn glare(&self, state: &PathState<'_>, lobe: &Lobe, (value, brought): (f64, f64), path: &mut Path) {
+        if state.lobes > 0
+            && value > 0.0
+            && state.images[0].head(self.shape.bands).iter().any(|lit| *lit > 0.0)
+        {
             path.glare = path.glare.max(brought * sqrt(lobe.value(1.0) / value));
         }
     }
 
     /// What a highlight of the value 1 brings to a chain, relative to the reference radiance.
-    pub(super) fn gloss_at_stake(&self, through: &[f64; MAX_BANDS], sun: &Sun<'_>) -> f64 {
+    pub(super) fn gloss_at_stake(&self, throughput: &[f64; MAX_BANDS], sun: &Sun<'_>) -> f64 {
         let mut largest: f64 = 0.0;
-        for (band, (through, reference)) in through.iter().zip(self.reference).enumerate() {
-            let value = through * sun.irradiance(band);
+        for (band, (throughput, reference)) in throughput.iter().zip(self.reference).enumerate() {
+            let value = throughput * sun.irradiance(band);
             largest = if value > 0.0 { largest.max(value / reference) } else { largest };
         }
         largest
     }
 
-    /// Adds a highlight of which `leg.images` holds the lit share of `all`.
-    fn add_highlight(&self, leg: &Leg<'_>, (sun, value, all): (&Sun<'_>, f64, f64), terms: &mut Terms) {
+    /// Adds a highlight of which `state.images` holds the lit share of `all`.
+    fn add_highlight(
+        &self,
+        state: &PathState<'_>,
+        (sun, value, all): (&Sun<'_>, f64, f64),
+        terms: &mut Terms,
+    ) {
         if all <= 0.0 {
             return;
         }
-        let own = terms.mirror_sky.iter_mut().zip(leg.through.iter().zip(&leg.images[0]));
-        for (band, (to, (through, lit))) in own.enumerate().take(self.shape.bands) {
-            *to += through * sun.irradiance(band) * value * (lit / all);
+        let own = terms.mirror_sky.iter_mut().zip(state.throughput.iter().zip(&state.images[0]));
+        for (band, (to, (throughput, lit))) in own.enumerate().take(self.shape.bands) {
+            *to += throughput * sun.irradiance(band) * value * (lit / all);
         }
     }
 }

@@ -28,7 +28,7 @@ impl Painter<'_, '_> {
                 while !run.is_empty() && self.reaches(row, &run) {
                     if run.len() == 1 {
                         let at = self.slot(row, run.start) + self.stride - 1;
-                        self.lines.set(at, f64::INFINITY);
+                        self.centre_rows.set(at, f64::INFINITY);
                         break;
                     }
                     run.end = run.start + run.len() as isize / 2;
@@ -43,13 +43,13 @@ impl Painter<'_, '_> {
     pub(super) fn is_thin(&self, row: isize, column: isize) -> bool {
         let end = self.slot(row, column) + self.stride;
         let empty = self.is_dark(end - self.stride);
-        self.lines.at(end - 1) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
+        self.centre_rows.at(end - 1) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
     }
 
     /// Whether a pixel's centre shows no facet, or a black back.
     fn is_dark(&self, at: usize) -> bool {
-        let terms = self.lines.part(at..at + 3 * self.solved.shape.bands);
-        self.lines.at(at + self.stride - PIXEL_NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
+        let terms = self.centre_rows.part(at..at + 3 * self.solved.shape.bands);
+        self.centre_rows.at(at + self.stride - PIXEL_NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
     }
 
     /// Whether the front of a facet may reach into some pixels of a row.

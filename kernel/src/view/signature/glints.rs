@@ -319,14 +319,14 @@ impl Glints<'_, '_> {
     fn is_lit(&mut self, seen: &Seen<'_>, surface: &Surface, toward: Vec3, sums: &mut Sums) -> bool {
         let solved = self.solved;
         sums.rays += 1;
-        if toward.dot(surface.normal) <= 0.0 || solved.bvh.occluded(&surface.leave(-self.forward)) {
+        if toward.dot(surface.normal) <= 0.0 || solved.bvh.occluded(&surface.spawn_ray(-self.forward)) {
             return false;
         }
         let [products, _] = &mut *self.products;
         if seen.straight {
             products.head_mut(solved.shape.bands).fill(1.0);
             sums.rays += 1;
-            return !solved.bvh.occluded(&surface.leave(toward));
+            return !solved.bvh.occluded(&surface.spawn_ray(toward));
         }
         let (Some(sun), mut path) = (&solved.light.sun, Path::default()) else { return false };
         let lit =

@@ -12,7 +12,7 @@ use crate::scene::NO_MIRROR;
 
 /// Directions in which rays leave a facet's side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Toward {
+pub(super) enum RayKind {
     /// The mirror direction of parallel rays.
     Mirror,
     /// The sun.
@@ -21,13 +21,13 @@ pub(super) enum Toward {
     Image(u32),
 }
 
-impl Toward {
+impl RayKind {
     /// A number other than 0.
     fn number(self) -> u32 {
         match self {
-            Toward::Mirror => 1,
-            Toward::Sun => 2,
-            Toward::Image(n) => 3 + n,
+            RayKind::Mirror => 1,
+            RayKind::Sun => 2,
+            RayKind::Image(n) => 3 + n,
         }
     }
 }
@@ -36,18 +36,18 @@ impl Toward {
 const OCCLUDERS_MOST: usize = 13;
 
 /// Ways that are remembered, a power of 2.
-const WAYS: usize = 512;
+const LISTS_KEPT: usize = 512;
 
 /// In place of a count: too many.
 const OCCLUDERS_TOO_MANY: u32 = u32::MAX;
 
 plain_struct! {
     /// What may stand before one side of a facet in one direction.
-    pub struct Way {
+    pub struct Occluders {
         /// Twice the facet and the side.
         pub side: u32,
-        /// [`Toward::number`]; 0: an empty place.
-        pub toward: u32,
+        /// [`RayKind::number`]; 0: an empty place.
+        pub kind: u32,
         /// Facets that may be in the way, or [`OCCLUDERS_TOO_MANY`]; toward an image of the sun: mirrors in the way that may show it.
         pub count: u32,
         /// Which.
@@ -83,11 +83,11 @@ pub(super) enum Walk<'a> {
 impl Walk<'_> {
     /// The next image.
     #[inline]
-    pub(super) fn next(&mut self, outlook: &Outlook<'_>) -> Option<Image> {
+    pub(super) fn next(&mut self, occluders: &OccluderCache<'_>) -> Option<Image> {
         match self {
             Walk::Remembered(at) => {
                 *at += 1;
-                let images = outlook.images.as_ref()?;
+                let images = occluders.images.as_ref()?;
                 images.all.head(images.count).get(*at - 1).copied()
             }
             Walk::All(nearby) => nearby.next(),
@@ -96,8 +96,8 @@ impl Walk<'_> {
 }
 
 /// Ways asked for lately; the same answers whether they are remembered or not.
-pub struct Outlook<'m> {
-    ways: &'m mut [Way],
+pub struct OccluderCache<'m> {
+    lists: &'m mut [Occluders],
     /// None for a single ray: they are too large to be set up for it.
     images: Option<Images>,
     /// What may be outlines from points of facets.
@@ -112,34 +112,34 @@ pub struct Outlook<'m> {
 /// Rays that cost as much as a look.
 const WORTH: f64 = 8.0;
 
-impl<'m> Outlook<'m> {
-    /// Values of type [`Way`] in which an outlook works.
-    pub const ROOM: usize = WAYS;
+impl<'m> OccluderCache<'m> {
+    /// Values of type [`Occluders`] that a cache holds.
+    pub const ROOM: usize = LISTS_KEPT;
 
-    /// For rays that are parallel to begin with, or not; `ways` holds [`Outlook::ROOM`], all zero, or none; parallel
+    /// For rays that are parallel to begin with, or not; `lists` holds [`OccluderCache::ROOM`], all zero, or none; parallel
     /// rays have this area each, and so many follow them toward the sun.
-    pub fn new(ways: &'m mut [Way], parallel: bool, area: f64, sun: f64) -> Outlook<'m> {
+    pub fn new(lists: &'m mut [Occluders], parallel: bool, area: f64, sun: f64) -> OccluderCache<'m> {
         let least = if parallel { WORTH * area } else { 0.0 };
         let all = [Image::default(); IMAGES];
         let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
         let images = (IMAGES > 0).then_some(images);
-        Outlook { ways, images, parallel, least: (least, least / sun), ..Outlook::none() }
+        OccluderCache { lists, images, parallel, least: (least, least / sun), ..OccluderCache::none() }
     }
 
-    /// No outlook: every ray is traced.
-    pub fn none() -> Outlook<'m> {
+    /// A cache that holds nothing: every ray is traced.
+    pub fn none() -> OccluderCache<'m> {
         let candidates = Candidates::none();
-        Outlook { ways: &mut [], images: None, candidates, parallel: false, least: (0.0, 0.0) }
+        OccluderCache { lists: &mut [], images: None, candidates, parallel: false, least: (0.0, 0.0) }
     }
 
     /// The same with room for outlines.
-    pub fn with_candidates(self, candidates: Candidates<'m>) -> Outlook<'m> {
-        Outlook { candidates, ..self }
+    pub fn with_candidates(self, candidates: Candidates<'m>) -> OccluderCache<'m> {
+        OccluderCache { candidates, ..self }
     }
 
     /// Whether first rays are parallel and ways are known.
     pub(super) fn is_parallel(&self) -> bool {
-        self.parallel && !self.ways.is_empty()
+        self.parallel && !self.lists.is_empty()
     }
 
     /// The images of the sun that may be seen from a point of a surface.
@@ -171,25 +171,25 @@ impl<'m> Outlook<'m> {
         &mut self,
         solved: &Solved<'_>,
         surface: &Surface,
-        toward: Toward,
+        kind: RayKind,
         (direction, spread): (Vec3, f64),
     ) -> Option<&[u32]> {
         let area = solved.scene.areas().at(surface.facet);
-        let small = match toward {
-            Toward::Mirror => area * surface.normal.dot(direction) < self.least.0,
+        let small = match kind {
+            RayKind::Mirror => area * surface.normal.dot(direction) < self.least.0,
             _ => area < self.least.1,
         };
         if small {
             return None;
         }
-        let (side, toward) = (2 * surface.facet as u32 + surface.side as u32, toward.number());
-        let place = side.wrapping_mul(7).wrapping_add(toward.wrapping_mul(0x9e37_79b1)) as usize;
-        let way = self.ways.get_mut(place & (WAYS - 1))?;
-        if (way.side, way.toward) != (side, toward) {
-            *way = Way { side, toward, ..Way::default() };
-            way.look(solved, surface, direction, spread);
+        let (side, kind) = (2 * surface.facet as u32 + surface.side as u32, kind.number());
+        let place = side.wrapping_mul(7).wrapping_add(kind.wrapping_mul(0x9e37_79b1)) as usize;
+        let list = self.lists.get_mut(place & (LISTS_KEPT - 1))?;
+        if (list.side, list.kind) != (side, kind) {
+            *list = Occluders { side, kind, ..Occluders::default() };
+            list.collect(solved, surface, direction, spread);
         }
-        if way.count == OCCLUDERS_TOO_MANY { None } else { Some(way.facets.head(way.count as usize)) }
+        if list.count == OCCLUDERS_TOO_MANY { None } else { Some(list.facets.head(list.count as usize)) }
     }
 }
 
@@ -197,10 +197,10 @@ impl<'m> Outlook<'m> {
 /// directions and hits.
 const MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
 
-impl Way {
+impl Occluders {
     /// Finds what reaches into the region that the facet sweeps along the directions, from where rays start above it.
     #[inline(never)]
-    fn look(&mut self, solved: &Solved<'_>, surface: &Surface, direction: Vec3, spread: f64) {
+    fn collect(&mut self, solved: &Solved<'_>, surface: &Surface, direction: Vec3, spread: f64) {
         self.count = OCCLUDERS_TOO_MANY;
         let corners = solved.scene.corners().at(surface.facet);
         let normal = surface.normal;
@@ -217,7 +217,7 @@ impl Way {
         }
         let (mut count, own) = (0, surface.facet as u32);
         // of what is in the way to an image of the sun, the mirrors that may show it count
-        let image = self.toward >= Toward::Image(0).number();
+        let image = self.kind >= RayKind::Image(0).number();
         let facets = &mut self.facets;
         solved.bvh.within(&halves, |facet| {
             if facet == own || image && !solved.shows_sun(facet as usize, direction) {

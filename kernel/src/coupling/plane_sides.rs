@@ -33,7 +33,7 @@ type Corners = [[[f64; PLANE_LANES]; 3]; 3];
 
 /// The sets of facets before each side's plane; none for scenes of more than [`SIDES_MOST`] sides.
 #[derive(Clone, Copy, Debug)]
-pub struct Facing<'m> {
+pub struct PlaneSides<'m> {
     before: &'m [u64],
     /// Facets that have others on both sides of their planes: only these can stand between two.
     screens: &'m [u64],
@@ -43,9 +43,10 @@ pub struct Facing<'m> {
     sides: usize,
 }
 
-impl<'m> Facing<'m> {
+impl<'m> PlaneSides<'m> {
     /// Nothing is known.
-    pub const NONE: Facing<'static> = Facing { before: &[], screens: &[], shared: &[], words: 0, sides: 1 };
+    pub const NONE: PlaneSides<'static> =
+        PlaneSides { before: &[], screens: &[], shared: &[], words: 0, sides: 1 };
 
     fn words(scene: &Scene<'_>, wanted: bool) -> usize {
         let few = scene.facets() * scene.sides() <= SIDES_MOST;
@@ -55,7 +56,7 @@ impl<'m> Facing<'m> {
     /// Bytes for a scene: at most 9 MiB. Not `wanted` where the sky's directions are to be kept: what uses the table then
     /// gains nothing by it.
     pub fn bytes(scene: &Scene<'_>, wanted: bool) -> Result<usize, Error> {
-        let words = Facing::words(scene, wanted);
+        let words = PlaneSides::words(scene, wanted);
         let rows = scene.facets() * scene.sides();
         let blocks = if words > 0 { scene.facets().div_ceil(PLANE_LANES) } else { 0 };
         let sets = Need::new().and::<u64>(if words > 0 { rows * words } else { 0 });
@@ -68,11 +69,11 @@ impl<'m> Facing<'m> {
         bvh: &Bvh<'_>,
         wanted: bool,
         memory: &'m mut [u8],
-    ) -> Result<Facing<'m>, Error> {
-        let (words, sides) = (Facing::words(scene, wanted), scene.sides());
-        let mut arena = Arena::new(memory, Facing::bytes(scene, wanted)?)?;
+    ) -> Result<PlaneSides<'m>, Error> {
+        let (words, sides) = (PlaneSides::words(scene, wanted), scene.sides());
+        let mut arena = Arena::new(memory, PlaneSides::bytes(scene, wanted)?)?;
         if words == 0 {
-            return Ok(Facing::NONE);
+            return Ok(PlaneSides::NONE);
         }
         let before = arena.take::<u64>(scene.facets() * sides * words)?;
         let screens = arena.take::<u64>(words)?;
@@ -119,7 +120,7 @@ impl<'m> Facing<'m> {
                 copy(rows.part_mut(words..2 * words), behind);
             }
         }
-        Ok(Facing { before, screens, shared, words, sides })
+        Ok(PlaneSides { before, screens, shared, words, sides })
     }
 
     /// True where the scene has too many sides: nothing is known then.
@@ -144,7 +145,7 @@ impl<'m> Facing<'m> {
 
     /// Whether nothing stands between the receiver and a side of another facet. Each facet that planes leave in question
     /// costs one of `tries`; false where they are used up.
-    pub fn clear(
+    pub fn is_unoccluded(
         &self,
         scene: &Scene<'_>,
         receiver: &Receiver,
@@ -164,7 +165,8 @@ impl<'m> Facing<'m> {
         let to = scene.corners().at(other);
         between.all(|k| {
             *tries = tries.saturating_sub(1);
-            *tries > 0 && apart(&receiver.corners, &to, (&scene.corners().at(k), scene.side_normal(k, 0)))
+            *tries > 0
+                && is_separated(&receiver.corners, &to, (&scene.corners().at(k), scene.side_normal(k, 0)))
         })
     }
 }
@@ -198,7 +200,7 @@ const TRIES: u32 = 64;
 
 /// What a receiver sees that nothing hides: sides of facets, and how many elements they have.
 #[derive(Debug)]
-pub struct Clear<'m> {
+pub struct ProvenVisible<'m> {
     proven: &'m mut [u64],
     /// Elements of the proven sides.
     pub elements: usize,
@@ -206,16 +208,16 @@ pub struct Clear<'m> {
     pub all: bool,
 }
 
-impl<'m> Clear<'m> {
+impl<'m> ProvenVisible<'m> {
     /// Words of memory for a scene's sides.
     pub fn words(scene: &Scene<'_>) -> usize {
         (scene.facets() * scene.sides()).div_ceil(64).min(SIDE_SET_WORDS)
     }
 
-    /// Nothing is proven yet; `memory` has [`Clear::words`] words of any content.
-    pub fn new(memory: &'m mut [u64]) -> Clear<'m> {
+    /// Nothing is proven yet; `memory` has [`ProvenVisible::words`] words of any content.
+    pub fn new(memory: &'m mut [u64]) -> ProvenVisible<'m> {
         memory.fill(0);
-        Clear { proven: memory, elements: 0, all: true }
+        ProvenVisible { proven: memory, elements: 0, all: true }
     }
 
     /// Forgets all that is proven.
@@ -229,28 +231,28 @@ impl<'m> Clear<'m> {
         contains(self.proven, facet * sides + side)
     }
 
-    /// As [`Clear::prove`], facets being counted; whether the receiver sees nothing else.
+    /// As [`ProvenVisible::prove`], facets being counted; whether the receiver sees nothing else.
     pub fn prove_whole(
         &mut self,
         scene: &Scene<'_>,
-        facing: &Facing<'_>,
+        plane_sides: &PlaneSides<'_>,
         receiver: &Receiver,
         most: usize,
     ) -> bool {
         // the back of a one-sided facet may show, or is hidden by what no plane tells
         let back =
             |facet: usize| scene.sides() == 1 && heights(scene, facet, &receiver.corners).0 < -EDGE_ON_HEIGHT;
-        if facing.is_empty() || facing.before(receiver.facet, receiver.side).any(back) {
+        if plane_sides.is_empty() || plane_sides.before(receiver.facet, receiver.side).any(back) {
             return false;
         }
-        self.prove(scene, facing, receiver, most, |_, _| 1);
+        self.prove(scene, plane_sides, receiver, most, |_, _| 1);
         self.all
     }
 
     /// How many elements the receiver may see, `count` those of a side of a facet.
     pub fn possible(
         scene: &Scene<'_>,
-        facing: &Facing<'_>,
+        plane_sides: &PlaneSides<'_>,
         receiver: &Receiver,
         count: impl Fn(usize, usize) -> usize,
     ) -> usize {
@@ -259,7 +261,7 @@ impl<'m> Clear<'m> {
             let front = if high > EDGE_ON_HEIGHT { count(facet, 0) } else { 0 };
             front + if low < -EDGE_ON_HEIGHT && scene.sides() == 2 { count(facet, 1) } else { 0 }
         };
-        facing.before(receiver.facet, receiver.side).map(of).sum()
+        plane_sides.before(receiver.facet, receiver.side).map(of).sum()
     }
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
@@ -267,13 +269,13 @@ impl<'m> Clear<'m> {
     pub fn prove(
         &mut self,
         scene: &Scene<'_>,
-        facing: &Facing<'_>,
+        plane_sides: &PlaneSides<'_>,
         receiver: &Receiver,
         most: usize,
         count: impl Fn(usize, usize) -> usize,
     ) {
         let mut tries = TRIES;
-        for facet in facing.before(receiver.facet, receiver.side) {
+        for facet in plane_sides.before(receiver.facet, receiver.side) {
             let (low, high) = heights(scene, facet, &receiver.corners);
             for side in [0, 1] {
                 let seen = if side == 0 { high > EDGE_ON_HEIGHT } else { low < -EDGE_ON_HEIGHT };
@@ -283,8 +285,8 @@ impl<'m> Clear<'m> {
                 let count = count(facet, side);
                 if side < scene.sides()
                     && self.elements + count <= most
-                    && facing.is_alone(facet)
-                    && facing.clear(scene, receiver, (facet, side), &mut tries)
+                    && plane_sides.is_alone(facet)
+                    && plane_sides.is_unoccluded(scene, receiver, (facet, side), &mut tries)
                 {
                     insert(self.proven, facet * scene.sides() + side);
                     self.elements += count;
@@ -400,7 +402,7 @@ fn overlap(scene: &Scene<'_>, one: usize, other: usize) -> bool {
 }
 
 /// Whether a plane is found that has a facet on one side and the convex hull of two triangles on the other.
-fn apart(a: &[Vec3; 3], b: &[Vec3; 3], (facet, normal): (&[Vec3; 3], Vec3)) -> bool {
+fn is_separated(a: &[Vec3; 3], b: &[Vec3; 3], (facet, normal): (&[Vec3; 3], Vec3)) -> bool {
     let base = facet.iter().map(|c| c.dot(normal)).sum::<f64>() / 3.0;
     let heights = |t: &[Vec3; 3]| range(t.map(|c| c.dot(normal) - base));
     let ((al, ah), (bl, bh)) = (heights(a), heights(b));
@@ -432,7 +434,11 @@ mod tests {
     use crate::base::simd::Isa;
     use crate::scene::{MaterialInput, SceneInput};
 
-    fn facing(vertices: &[[f64; 3]], facets: &[[u32; 3]], check: impl FnOnce(&Scene<'_>, &Facing<'_>)) {
+    fn plane_sides(
+        vertices: &[[f64; 3]],
+        facets: &[[u32; 3]],
+        check: impl FnOnce(&Scene<'_>, &PlaneSides<'_>),
+    ) {
         let material = MaterialInput { diffuse: &[0.5], specular: &[0.0], emission: &[0.0], gloss: None };
         let input = SceneInput {
             vertices,
@@ -447,11 +453,11 @@ mod tests {
         let (mut memory, mut tree, mut table) = ([0u8; 4096], [0u8; 16384], [0u8; 4096]);
         let scene = Scene::new(&input, &mut memory).unwrap();
         let bvh = Bvh::build(scene.corners(), scene.areas(), Isa::detect(), &mut tree).unwrap();
-        check(&scene, &Facing::new(&scene, &bvh, true, &mut table).unwrap());
+        check(&scene, &PlaneSides::new(&scene, &bvh, true, &mut table).unwrap());
     }
 
     /// Two triangles that face each other across a gap of 2, and a third between them or beside.
-    fn between(x: f64, check: impl FnOnce(&Scene<'_>, &Facing<'_>)) {
+    fn between(x: f64, check: impl FnOnce(&Scene<'_>, &PlaneSides<'_>)) {
         let vertices = [
             [0.0, 0.0, 0.0],
             [1.0, 0.0, 0.0],
@@ -463,19 +469,19 @@ mod tests {
             [x + 0.3, 0.1, 1.0],
             [x, 0.4, 1.1],
         ];
-        facing(&vertices, &[[0, 1, 2], [3, 5, 4], [6, 7, 8]], check);
+        plane_sides(&vertices, &[[0, 1, 2], [3, 5, 4], [6, 7, 8]], check);
     }
 
     #[test]
     fn what_stands_between_is_found() {
         let clear = |x: f64, tries: u32| {
             let mut found = None;
-            between(x, |scene, facing| {
+            between(x, |scene, plane_sides| {
                 let corners = scene.corners()[0];
                 let receiver = Receiver { facet: 0, side: 0, normal: Vec3::Z, corners };
-                found = Some(facing.clear(scene, &receiver, (1, 0), &mut { tries }));
-                assert!(facing.before(0, 0).eq([1, 2]));
-                assert!((0..3).all(|f| facing.is_alone(f)));
+                found = Some(plane_sides.is_unoccluded(scene, &receiver, (1, 0), &mut { tries }));
+                assert!(plane_sides.before(0, 0).eq([1, 2]));
+                assert!((0..3).all(|f| plane_sides.is_alone(f)));
             });
             found.unwrap()
         };
@@ -497,8 +503,8 @@ mod tests {
             [0.0, 0.0, 1.0],
             [1.0, 0.0, 1.0],
         ];
-        facing(&vertices, &[[0, 1, 2], [1, 3, 2], [4, 6, 5], [0, 8, 7]], |_, facing| {
-            assert_eq!([0, 1, 2, 3].map(|f| facing.is_alone(f)), [false, true, false, true]);
+        plane_sides(&vertices, &[[0, 1, 2], [1, 3, 2], [4, 6, 5], [0, 8, 7]], |_, plane_sides| {
+            assert_eq!([0, 1, 2, 3].map(|f| plane_sides.is_alone(f)), [false, true, false, true]);
         });
     }
 }

@@ -1,12 +1,12 @@
 //! Writes rows of records into a block of caller memory.
 
-use super::word::{STRAIGHT, Word, Words};
+use super::mirror_path::{MirrorPath, MirrorPaths, STRAIGHT};
 use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
 use crate::base::arena::{ALIGNMENT, Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::sort;
-use crate::coupling::facing::SIDE_SET_WORDS;
+use crate::coupling::plane_sides::SIDE_SET_WORDS;
 use crate::scene::Scene;
 use core::cmp::Ordering;
 use core::ops::Range;
@@ -15,19 +15,19 @@ use core::ops::Range;
 /// records while it grows.
 pub fn bytes(rows: usize, records: usize, unmerged: usize, bands: usize) -> Result<usize, Error> {
     let all = rows.saturating_mul(records).saturating_add(unmerged);
-    let capacity = word_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
+    let capacity = path_capacity(all.saturating_mul(2 * size_of::<Record>()), bands);
     // behind the block, a set of sides while rows are made
     fixed(rows, capacity, bands).and::<Record>(all).and::<u64>(2 * ALIGNMENT / 8 + SIDE_SET_WORDS).bytes()
 }
 
-/// Words that a block of so many bytes has room for: 1/16 of it.
-fn word_capacity(bytes: usize, bands: usize) -> usize {
-    (bytes / 16 / size_of::<Word>().saturating_add(bands.saturating_mul(8)).max(1))
+/// Paths that a block of `bytes` bytes has room for: 1/16 of it.
+fn path_capacity(bytes: usize, bands: usize) -> usize {
+    (bytes / 16 / size_of::<MirrorPath>().saturating_add(bands.saturating_mul(8)).max(1))
         .clamp(16, BLOCKED as usize)
 }
 
 fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
-    Need::new().and::<Head>(1).and::<Row>(rows + 1).and::<Word>(capacity).and::<f64>(capacity * bands)
+    Need::new().and::<Head>(1).and::<Row>(rows + 1).and::<MirrorPath>(capacity).and::<f64>(capacity * bands)
 }
 
 /// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
@@ -35,9 +35,9 @@ pub(crate) const CLOSED_REMAINDER_MOST: f64 = 0.5;
 
 /// The rows of a block while they are being written.
 #[derive(Debug)]
-pub struct Sink<'m> {
-    /// The words of the block.
-    pub words: Words<'m>,
+pub struct RowBuilder<'m> {
+    /// The paths of the block.
+    pub paths: MirrorPaths<'m>,
     head: &'m mut Head,
     rows: &'m mut [Row],
     records: &'m mut [Record],
@@ -46,20 +46,20 @@ pub struct Sink<'m> {
     done: usize,
 }
 
-impl<'m> Sink<'m> {
+impl<'m> RowBuilder<'m> {
     /// An empty block for the rows of `range`.
     pub fn new(
         range: &Range<usize>,
         bands: usize,
         directional: bool,
         memory: &'m mut [u8],
-    ) -> Result<Sink<'m>, Error> {
-        let capacity = word_capacity(memory.len(), bands);
+    ) -> Result<RowBuilder<'m>, Error> {
+        let capacity = path_capacity(memory.len(), bands);
         let needed = fixed(range.len(), capacity, bands).and::<Record>(64).bytes()?;
         let mut arena = Arena::new(memory, needed)?;
         let head = arena.take::<Head>(1)?;
         let rows = arena.take::<Row>(range.len() + 1)?;
-        let words = arena.take::<Word>(capacity)?;
+        let paths = arena.take::<MirrorPath>(capacity)?;
         let products = arena.take::<f64>(capacity * bands)?;
         let room = arena.left().saturating_sub(ALIGNMENT) / size_of::<Record>();
         let records = arena.take::<Record>(room.min(u32::MAX as usize))?;
@@ -72,8 +72,8 @@ impl<'m> Sink<'m> {
             directional: u64::from(directional),
             ..Head::default()
         };
-        Ok(Sink {
-            words: Words::new(words, products, bands),
+        Ok(RowBuilder {
+            paths: MirrorPaths::new(paths, products, bands),
             head,
             rows,
             records,
@@ -110,12 +110,12 @@ impl<'m> Sink<'m> {
         }
     }
 
-    /// The word with one more letter; `Err(true)` where the chain must end, since one row alone has used up all
-    /// words; `Err(false)` where more memory or an empty block helps.
+    /// The path with one more mirror; `Err(true)` where the chain must end, since one row alone has used up all
+    /// paths; `Err(false)` where more memory or an empty block helps.
     #[inline]
-    pub fn spell(&mut self, word: u16, class: u32, scene: &Scene<'_>) -> Result<u16, bool> {
+    pub fn extend_path(&mut self, path: u16, class: u32, scene: &Scene<'_>) -> Result<u16, bool> {
         let alone = self.done == 0;
-        self.words.push(word, class, scene).ok_or_else(|| alone && self.words.is_exhausted())
+        self.paths.push(path, class, scene).ok_or_else(|| alone && self.paths.is_exhausted())
     }
 
     /// Drops the present row.
@@ -130,10 +130,10 @@ impl<'m> Sink<'m> {
 
     /// Sorts the records of the present row and adds up those that `join` takes for the same, so that a row of many rays
     /// needs no memory for each; returns how many are left.
-    pub fn fold(&mut self, join: impl Fn(&mut Record, &Record) -> bool) -> usize {
+    pub fn merge_duplicates(&mut self, join: impl Fn(&mut Record, &Record) -> bool) -> usize {
         let row = self.records.part_mut(self.start..self.used);
-        let words = &self.words;
-        sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
+        let paths = &self.paths;
+        sort::sort(row, &|a: &Record, b: &Record| order(paths, a, b));
         let kept = merge(row, join);
         self.used = self.start + kept;
         kept
@@ -156,15 +156,15 @@ impl<'m> Sink<'m> {
             }
         }
         let row = row.head_mut(kept);
-        let words = &self.words;
-        sort::sort(row, &|a: &Record, b: &Record| order(words, a, b));
+        let paths = &self.paths;
+        sort::sort(row, &|a: &Record, b: &Record| order(paths, a, b));
         let kept = merge(row, join);
         let row = row.head_mut(kept);
         let targets = row.partition_point(|r| !r.is_escape());
         let escapes = self.start + targets;
         let enclosed = stats.state == ENCLOSED;
-        let word = if enclosed { STRAIGHT } else { BLOCKED };
-        let own = row.part(targets..kept).iter().filter(|r| r.word() == word).map(|r| r.weight).sum::<f64>();
+        let path = if enclosed { STRAIGHT } else { BLOCKED };
+        let own = row.part(targets..kept).iter().filter(|r| r.path() == path).map(|r| r.weight).sum::<f64>();
         let blocked = if enclosed { 1.0 - own } else { own };
         let packed = bundle::pack(row.part_mut(targets..kept));
         self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, blocked, ..stats });
@@ -180,7 +180,7 @@ impl<'m> Sink<'m> {
         }
         self.head.rows = self.done as u64;
         self.head.records = self.used as u64;
-        self.head.words = self.words.used() as u64;
+        self.head.paths = self.paths.used() as u64;
         self.done
     }
 }
@@ -210,16 +210,16 @@ fn merge(row: &mut [Record], join: impl Fn(&mut Record, &Record) -> bool) -> usi
     kept
 }
 
-/// The order of a row: targets by what they are, then by word; behind them escapes by word, then as bundles need it;
-/// whatever the words' numbers in this block.
-fn order(words: &Words<'_>, a: &Record, b: &Record) -> Ordering {
+/// The order of a row: targets by what they are, then by path; behind them escapes by path, then as bundles need it;
+/// whatever the paths' numbers in this block.
+fn order(paths: &MirrorPaths<'_>, a: &Record, b: &Record) -> Ordering {
     let escape = a.is_escape();
-    let by_word = || match (a.word(), b.word()) {
+    let by_path = || match (a.path(), b.path()) {
         (a, b) if a == b => Ordering::Equal,
         (BLOCKED, _) => Ordering::Greater,
         (_, BLOCKED) => Ordering::Less,
-        (a, b) => words.compare(a, b),
+        (a, b) => paths.compare(a, b),
     };
     let first = if escape && b.is_escape() { Ordering::Equal } else { (a.key >> 16).cmp(&(b.key >> 16)) };
-    first.then_with(by_word).then_with(|| if escape { bundle::order(a, b) } else { Ordering::Equal })
+    first.then_with(by_path).then_with(|| if escape { bundle::order(a, b) } else { Ordering::Equal })
 }

@@ -29,26 +29,26 @@ const DETAIL_ELEMENTS_KEPT: usize = if GATHERS { 64 } else { 0 };
 
 plain_table! {
     /// What is known of the elements that were asked about latest.
-    pub struct Surroundings {
+    pub struct DetailCache {
         /// Each at its number's place: twice the unknown's number and 2, and 1 where small facets may stand near it.
         pub known: [u64; DETAIL_ELEMENTS_KEPT],
     }
 }
 
-impl Surroundings {
+impl DetailCache {
     /// Nothing is known.
-    pub const ZERO: Surroundings = Surroundings { known: [0; DETAIL_ELEMENTS_KEPT] };
+    pub const ZERO: DetailCache = DetailCache { known: [0; DETAIL_ELEMENTS_KEPT] };
 }
 
 impl Solved<'_> {
     /// Whether facets far smaller than its element stand near a point that a ray met after so long a way.
     #[inline]
-    pub(super) fn is_crowded(
+    pub(super) fn has_fine_detail_nearby(
         &self,
         surface: &Surface,
         unknown: usize,
         far: f64,
-        known: &mut Surroundings,
+        known: &mut DetailCache,
     ) -> bool {
         let (area, per_square) = self.settings.pixel;
         let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
@@ -57,25 +57,25 @@ impl Solved<'_> {
         GATHERS
             && element > PIXELS * pixel
             && self.bvh.is_own()
-            && self.element_is_crowded(unknown, &near(true), known)
-            && self.small_near(&near(element > LARGE * pixel), &[surface.point; 3])
+            && self.element_has_fine_detail(unknown, &near(true), known)
+            && self.finds_small_facets(&near(element > LARGE * pixel), &[surface.point; 3])
     }
 
     /// The same of any of its points, or because there are too many facets to tell.
     #[inline]
-    fn element_is_crowded(&self, unknown: usize, near: &Near, known: &mut Surroundings) -> bool {
+    fn element_has_fine_detail(&self, unknown: usize, near: &Near, known: &mut DetailCache) -> bool {
         let (place, name) = (unknown % DETAIL_ELEMENTS_KEPT.max(1), 2 * (unknown as u64 + 1));
         if known.known.at(place) & !1 != name {
             let corners = self.elements.corners(self.scene, unknown / self.scene.sides());
-            let crowded = self.small_near(near, &corners);
-            known.known.set(place, name | u64::from(crowded));
+            let detailed = self.finds_small_facets(near, &corners);
+            known.known.set(place, name | u64::from(detailed));
         }
         known.known.at(place) & 1 != 0
     }
 
     /// Whether small facets stand before the points of a triangle, or of a point alone.
     #[inline(never)]
-    fn small_near(&self, near: &Near, corners: &[Vec3; 3]) -> bool {
+    fn finds_small_facets(&self, near: &Near, corners: &[Vec3; 3]) -> bool {
         let (x, y) = frame(near.normal);
         let reach = DETAIL_DISTANCE_MOST * DETAIL_SIZE_MOST * near.size;
         let half = |normal: Vec3, below: f64| {
