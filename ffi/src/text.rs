@@ -40,6 +40,7 @@ macro_rules! processor {
     };
 }
 
+/// Version, variant and processor, as [`blik_build_info`] gives them.
 const BUILD: &CStr = match CStr::from_bytes_with_nul(
     concat!("blik ", env!("CARGO_PKG_VERSION"), ", ", variant!(), ", ", processor!(), "\0").as_bytes(),
 ) {

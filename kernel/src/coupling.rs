@@ -106,6 +106,7 @@ plain_struct! {
     }
 }
 
+/// Bit of a key that marks an escape.
 const ESCAPE: u64 = 1 << 63;
 
 /// The path of an escape that stands for light which does not arrive: its first ray met a facet.

@@ -96,8 +96,11 @@ impl Settings {
 /// The most bytes of a lane's beams: a facet's rays, all of which meet other elements, need less by far.
 const MOST_BEAM_BYTES: usize = 1 << 34;
 
-/// One piece in so many of an image's rows is looked at first, and the fewest pixels of the object that tell of the others.
+/// Share of the pieces of an image that a finer round computes first, as its inverse: they tell whether the rest is worth
+/// its time.
 const LOOKS: usize = 6;
+
+/// Fewest pixels of the object among those that tell of the rest.
 const LOOKED: u64 = 64;
 
 /// Threads on which all stages run.

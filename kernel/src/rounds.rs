@@ -4,16 +4,20 @@ use crate::base::math::sqrt;
 use crate::settings::check_tolerance;
 use crate::view::chain::GATHERS;
 
-/// The most rounds of one image, and the least and the most that is left of the tolerance from one to the next: half of it
-/// takes some four times as long.
+/// Most rounds of one image.
 const ROUNDS: u32 = 3;
+
+/// Least and largest ratio of a round's tolerance to the one before: half the tolerance takes some four times as long.
 const STEPS: (f64, f64) = (0.3, 0.7);
 
-/// A round that leaves so much of the last one's estimate: more rounds would, too, once they are as fine as asked.
+/// Ratio of a round's error estimate to the one before above which no other round follows, once the solution is as fine as
+/// asked: the next would gain as little.
 const IDLE: f64 = 0.8;
 
-/// The most rays and bytes that another round may be expected to take.
+/// Most rays that another round may be expected to take.
 const ROUND_RAYS_MOST: f64 = 2e8;
+
+/// Most bytes of coupling that another round may be expected to take.
 const ROUND_BYTES_MOST: f64 = (2u64 << 30) as f64;
 
 /// Tolerance of an image's first solution over that of the image: rays from the image's points find the rest, and light that
@@ -62,7 +66,7 @@ pub fn next_tolerance(asked: f64, last: &Round, before: Option<&Round>, rounds: 
     let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / ROUND_RAYS_MOST).max(last.bytes as f64 / ROUND_BYTES_MOST);
     let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
-    // closed forms are as cheap as that
+    // no ray was traced, as every row is in closed form: finer ones are as cheap
     let wanted = if coarse && last.rays == 0 { asked / last.tolerance } else { asked / last.estimate };
     let step = wanted.min(STEPS.1).max(least);
     let next = step * last.tolerance;

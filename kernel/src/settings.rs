@@ -140,8 +140,10 @@ pub fn beams(scene: &Scene<'_>, sun: &Sun<'_>, settings: &Settings) -> Option<Be
 /// Rays of all beams together, times the images' error: an element that a hundredth of them meets is wrong by n^-3/4 of that.
 const BEAM_RAYS: f64 = 100.0;
 
-/// Fewest and most rays of all beams: fewer leave elements unmet that others' shapes hide, more take minutes.
+/// Fewest rays of all beams together: fewer leave elements unmet.
 const FEWEST_BEAM_RAYS: f64 = 32768.0;
+
+/// Most rays of all beams together: more take minutes.
 const MOST_BEAM_RAYS: f64 = 1e8;
 
 /// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.

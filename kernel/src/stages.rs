@@ -99,6 +99,8 @@ pub fn block_rows(rows: usize) -> usize {
     rows.div_ceil(ROW_BLOCKS).clamp(BLOCK_ROWS.0, BLOCK_ROWS.1)
 }
 
-/// Blocks that the rows of a scene are split into, and the fewest and most rows of one.
+/// Number of blocks that the rows of a scene are split into: enough to balance two dozen threads.
 const ROW_BLOCKS: usize = 256;
+
+/// Fewest and most rows of one block: a block's head is not to count, and its memory is to be bounded.
 const BLOCK_ROWS: (usize, usize) = (16, 1024);

@@ -16,6 +16,7 @@ const JOE_KUO: [(u32, u32, [u32; 4]); DIMENSIONS - 1] = [
     (4, 1, [1, 1, 3, 3]),
 ];
 
+/// Direction numbers of all dimensions, 32 bits each.
 const DIRECTIONS: [[u32; 32]; DIMENSIONS] = directions();
 
 const fn directions() -> [[u32; 32]; DIMENSIONS] {

@@ -17,11 +17,15 @@ use crate::coupling::plane_sides::{PlaneSides, ProvenVisible, Receiver};
 use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
 use crate::scene::{NO_MIRROR, Scene};
 
-/// Gauss points of a triangle: weights of corners 1 and 2, weight. Of degree 1, 2 and 4 (Strang and Fix, 1973).
+/// Gauss point of a triangle, of degree 1: barycentric weights of corners 1 and 2, weight (Strang and Fix, 1973).
 const GAUSS_POINTS_1: [(f64, f64, f64); 1] = [(1.0 / 3.0, 1.0 / 3.0, 1.0)];
-const THREE: [(f64, f64, f64); 3] =
+
+/// Three Gauss points of degree 2. See [`GAUSS_POINTS_1`].
+const GAUSS_POINTS_3: [(f64, f64, f64); 3] =
     [(1.0 / 6.0, 1.0 / 6.0, 1.0 / 3.0), (2.0 / 3.0, 1.0 / 6.0, 1.0 / 3.0), (1.0 / 6.0, 2.0 / 3.0, 1.0 / 3.0)];
-const SIX: [(f64, f64, f64); 6] = {
+
+/// Six Gauss points of degree 4. See [`GAUSS_POINTS_1`].
+const GAUSS_POINTS_6: [(f64, f64, f64); 6] = {
     const A: (f64, f64) = (0.445_948_490_915_965, 0.223_381_589_678_011);
     const B: (f64, f64) = (0.091_576_213_509_771, 0.109_951_743_655_322);
     [
@@ -56,8 +60,8 @@ impl Rules {
     fn of(&self, ratio: f64) -> Option<&'static [(f64, f64, f64)]> {
         match ratio {
             x if x <= self.one => Some(&GAUSS_POINTS_1),
-            x if x <= self.three => Some(&THREE),
-            x if x <= self.six => Some(&SIX),
+            x if x <= self.three => Some(&GAUSS_POINTS_3),
+            x if x <= self.six => Some(&GAUSS_POINTS_6),
             _ => None,
         }
     }
@@ -268,8 +272,8 @@ impl Entries<'_, '_> {
     fn means(&self, place: &Place<'_>, class: usize, unknowns: &[u32]) -> [[f64; TRIANGLE_LANES]; QUARTERS] {
         let rule: &[(f64, f64, f64)] = match class {
             0 => &GAUSS_POINTS_1,
-            1 => &THREE,
-            _ => &SIX,
+            1 => &GAUSS_POINTS_3,
+            _ => &GAUSS_POINTS_6,
         };
         let mut block = TriangleBlock::EMPTY;
         for (lane, &unknown) in unknowns.iter().enumerate() {
@@ -410,7 +414,7 @@ impl Place<'_> {
             let of = |&(u, v, weight): &(f64, f64, f64)| {
                 weight * self.point_factor(point(&part, u, v), &target.corners, target)
             };
-            let mut mean: f64 = self.rules.of(ratio).unwrap_or(&SIX).iter().map(of).sum();
+            let mut mean: f64 = self.rules.of(ratio).unwrap_or(&GAUSS_POINTS_6).iter().map(of).sum();
             part = loop {
                 let Some((triangle, next, sum)) = depth.checked_sub(1).and_then(|d| whole.get_mut(d)) else {
                     return mean;

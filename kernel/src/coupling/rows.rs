@@ -103,8 +103,10 @@ const RAY: f64 = 0.35;
 /// Entries in closed form that together exceed the hemisphere by this hide one another, whatever was proven.
 const OVERFULL: f64 = 0.02;
 
-/// How many times the rays of a facet of mean area the largest and the smallest elements have.
+/// Rays of the largest elements, over those of a facet of mean area.
 const MOST_FACTOR: f64 = 2.0;
+
+/// Rays of the smallest elements, over those of a facet of mean area.
 const LEAST_FACTOR: f64 = 0.25;
 
 /// Rays that meet their first facets together: few where the stack is small.

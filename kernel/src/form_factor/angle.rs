@@ -3,8 +3,10 @@
 use crate::base::math::{FRAC_PI_2, PI};
 use crate::base::simd::{Lanes64, Wide};
 
-/// tan(pi/8) and its reciprocal: between them the argument is turned by pi/4, above by pi/2.
+/// tan(pi/8): arguments above it are turned by pi/4.
 const TAN_PI_8: f64 = 0.414_213_562_373_095_05;
+
+/// tan(3 pi/8), the reciprocal of [`TAN_PI_8`]: arguments above it are turned by pi/2.
 const TAN_3PI_8: f64 = 2.414_213_562_373_095;
 
 /// atan(z)/z in powers of z^2 for |z| <= tan(pi/8): interpolation at the Chebyshev nodes, error 3e-17.

@@ -31,6 +31,7 @@ pub(super) const CUBATURE_RULES: usize = 5;
 /// Points of the largest.
 pub(super) const CUBATURE_POINTS_MOST: usize = 37;
 
+/// Weight of a triangle's centre in each barycentric coordinate.
 const THIRD: f64 = 1.0 / 3.0;
 
 /// J. Radon, "Zur mechanischen Kubatur", Monatshefte fuer Mathematik 52, 1948.
@@ -48,12 +49,14 @@ const SQUARE_5: [[f64; 3]; 7] = {
     ]
 };
 
+/// Points of degree 7 on the unit square, one of each orbit, and their weights.
 const SQUARE_7: [[f64; 3]; 3] = [
     [0.09567862298090131, 0.09835635008431941, 0.05935461688098006],
     [0.685728578820085, 0.30523750067209093, 0.13018629121660932],
     [0.5061675080989845, 0.962941978462164, 0.06045909190241061],
 ];
 
+/// Points of degree 9 on the unit square, one of each orbit, and their weights.
 const SQUARE_9: [[f64; 3]; 4] = [
     [0.12486145001054973, 0.9639808229797848, 0.02802490053239912],
     [0.7266699105678236, 0.7618679101072147, 0.09957060981551752],
@@ -61,6 +64,7 @@ const SQUARE_9: [[f64; 3]; 4] = [
     [0.8153400598658345, 0.9844249831809888, 0.022219844542549678],
 ];
 
+/// Points of degree 11 on the unit square, one of each orbit, and their weights.
 const SQUARE_11: [[f64; 3]; 6] = [
     [0.08711208204851803, 0.9697431914083684, 0.01651783229113765],
     [0.594293069359321, 0.02323023589923399, 0.02434669433966704],
@@ -70,6 +74,7 @@ const SQUARE_11: [[f64; 3]; 6] = [
     [0.2875763755756654, 0.4791709640439888, 0.08778967959956135],
 ];
 
+/// Points of degree 13 on the unit square, one of each orbit, and their weights.
 const SQUARE_13: [[f64; 3]; 8] = [
     [0.9801585238776154, 0.7952688369327067, 0.014429995815020044],
     [0.018046601218163635, 0.9807656324930014, 0.00375856855934021],
@@ -81,11 +86,13 @@ const SQUARE_13: [[f64; 3]; 8] = [
     [0.8961454013727678, 0.9207583505746934, 0.02329202516905085],
 ];
 
+/// Points of degree 5 on the triangle, one of each orbit, and their weights.
 const TRIANGLE_5: [[f64; 3]; 2] = [
     [0.4701420641051151, 0.4701420641051151, 0.1323941527885062],
     [0.10128650732345634, 0.10128650732345634, 0.12593918054482714],
 ];
 
+/// Points of degree 7 on the triangle, one of each orbit, and their weights.
 const TRIANGLE_7: [[f64; 3]; 4] = [
     [0.03432430294509715, 0.3047265008681672, 0.057550085569963175],
     [0.8700998678316818, 0.06751786707391609, 0.053034056314872506],
@@ -93,6 +100,7 @@ const TRIANGLE_7: [[f64; 3]; 4] = [
     [0.5158423343535917, 0.20644149867001643, 0.13498637401960556],
 ];
 
+/// Points of degree 9 on the triangle, one of each orbit, and their weights.
 const TRIANGLE_9: [[f64; 3]; 6] = [
     [0.2219629891607657, 0.036838412054736286, 0.043283539377289376],
     [0.12582081701412673, 0.43708959149293664, 0.07782754100477428],
@@ -102,6 +110,7 @@ const TRIANGLE_9: [[f64; 3]; 6] = [
     [0.18820353561903272, 0.6235929287619345, 0.07964773892721025],
 ];
 
+/// Points of degree 11 on the triangle, one of each orbit, and their weights.
 const TRIANGLE_11: [[f64; 3]; 9] = [
     [0.2907330946081438, 0.44970950826452283, 0.0593968152810648],
     [0.15879800026543345, 0.8168439800143293, 0.02129856985139498],

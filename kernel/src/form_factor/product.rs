@@ -41,6 +41,7 @@ pub(super) enum Shape {
     Quadrilateral,
 }
 
+/// Number of shapes.
 pub(super) const SHAPES: usize = 3;
 
 impl Shape {
@@ -193,6 +194,7 @@ pub(super) struct Place([Eight; 4]);
 /// Room for the points of one side: of a quadrilateral, those of two triangles.
 pub(super) type Places = [Place; PRODUCT_POINTS];
 
+/// Points of one side at most: those of the largest rule on two triangles.
 pub(super) const PRODUCT_POINTS: usize = 2 * CUBATURE_POINTS_MOST;
 
 impl Place {
@@ -331,8 +333,10 @@ fn fourth_power<L: Lanes64>(lanes: L, place: &Place, from: Wide3<L::F>) -> (L::F
     (r2 * r2, lanes.of(weight))
 }
 
-/// Which rules a pair asks for, or why none.
+/// In place of the number of a pair's rules: one patch lies behind the other.
 pub(super) const BEHIND: u8 = 254;
+
+/// In place of the number of a pair's rules: no rule is exact enough.
 pub(super) const EXACT: u8 = 255;
 
 /// What is to be done with the pairs of one patch, spread over all lanes, and eight others, by lane: [`BEHIND`],

@@ -25,8 +25,13 @@ impl Rule {
     }
 }
 
+/// Gauss-Legendre rule of two points.
 pub(super) const GAUSS_2: Rule = Rule::of(&const { Gauss::<2>::new() });
+/// Gauss-Legendre rule of three points.
 pub(super) const GAUSS_3: Rule = Rule::of(&const { Gauss::<3>::new() });
+/// Gauss-Legendre rule of four points.
 pub(super) const GAUSS_4: Rule = Rule::of(&const { Gauss::<4>::new() });
+/// Gauss-Legendre rule of five points.
 pub(super) const GAUSS_5: Rule = Rule::of(&const { Gauss::<5>::new() });
+/// Gauss-Legendre rule of six points.
 pub(super) const GAUSS_6: Rule = Rule::of(&const { Gauss::<6>::new() });

@@ -46,6 +46,7 @@ type Solid = [[f64; 3]; 4];
 
 /// A child with this bit is a leaf: the packet's index, and [`PAIR`] where the leaf goes on in the next packet.
 const LEAF_CHILD: u32 = 1 << 31;
+/// Bit of a leaf that goes on in the next packet.
 const PAIR: u32 = 1 << 30;
 
 /// No facet: fills the lanes of packets that hold none.

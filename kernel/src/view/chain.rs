@@ -317,18 +317,27 @@ struct PathState<'w> {
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
 const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
-/// Error of the mean of n rays of a lobe whose radiances have the standard deviation s: 1.2 s n^-0.6, and 0.09 rho/n
-/// for what lies between them. In the study of two cylinders (tests/gloss.rs) that is 1 to 1.8 times the true error
-/// for 1 to 1000 rays.
+/// Factor of the error of a lobe's mean radiance: sqrt((LOBE_ERROR s n^-LOBE_POWER)^2 + (LOBE_BETWEEN rho/n)^2) for n rays
+/// whose radiances have the standard deviation s, at the reflectance rho.
+///
+/// With the other two 1 to 1.8 times the true error for 1 to 1000 rays in the study of two cylinders: `cargo test --test
+/// gloss` measures it.
 const LOBE_ERROR: f64 = 1.2;
-const LOBE_POWER: f64 = 0.6;
-const BETWEEN: f64 = 0.09;
 
-/// Rays of a lobe's first set, times rho over the tolerance.
+/// Power of 1/n in the same error: the rays of a lobe are stratified, but its radiance may jump. See [`LOBE_ERROR`].
+const LOBE_POWER: f64 = 0.6;
+
+/// Factor of the part of that error that lies between the rays and is told by none of them. See [`LOBE_ERROR`].
+const LOBE_BETWEEN: f64 = 0.09;
+
+/// Number of rays in a lobe's first set, times the wanted error over the lobe's reflectance: what lies between so many
+/// rays ([`LOBE_BETWEEN`]) is a small part of the wanted error.
 const FIRST_RAYS: f64 = 0.24;
 
-/// Fewest and most rays of one lobe.
+/// Fewest rays of one lobe: their standard deviation decides on the rest.
 const FEWEST_LOBE_RAYS: u32 = 4;
+
+/// Most rays of one lobe: a bound on the time of one pixel.
 const MOST_LOBE_RAYS: f64 = 1024.0;
 
 /// The rays of one lobe so far: sums over them.
@@ -364,7 +373,7 @@ impl LobeSamples<'_> {
     fn error(&self, reference: &[f64], throughput: f64) -> f64 {
         let n = f64::from(self.count.max(1));
         let (seen, between) =
-            (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), BETWEEN * throughput / n);
+            (LOBE_ERROR * self.spread(reference) * pow(n, -LOBE_POWER), LOBE_BETWEEN * throughput / n);
         let glare = self.path.glare / n;
         sqrt(seen * seen + between * between + glare * glare)
     }

@@ -102,8 +102,10 @@ fn work(bands: usize) -> usize {
 /// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
 const PIXEL_NOTES: usize = 5;
 
-/// Fewest and most rays through a pixel that is sampled by scattered rays.
+/// Fewest scattered rays through a pixel: fewer tell too little of their own spread.
 const SCATTER_RAYS_FEWEST: u32 = 8;
+
+/// Most scattered rays through a pixel: a bound on the time of one pixel.
 const SCATTER_RAYS_MOST: u32 = 1024;
 
 /// Error of the mean of n scattered rays of the standard deviation s over s n^-3/4: 0.8 to 1.2 in penumbrae, lobes and
@@ -120,10 +122,14 @@ const PIXEL_UNSEEN_SHARE: f64 = 0.35;
 /// centres is likelier.
 const STEEP: f64 = 0.25;
 
-/// First lines across a pixel and first places along each are these many parts, the latter shifted from line to line: what
-/// reaches less far into a pixel than a part, and ends there, is missed. The finer ones are for tolerances below [`FINE`].
+/// Parts into which first lines divide a pixel, and first places a line: for wanted errors from [`FINE_PIXELS`] on, and
+/// below.
+///
+/// Places are shifted from line to line. What reaches less far into a pixel than a part, and ends there, is missed.
 const PIXEL_PARTS: (usize, usize) = (4, 8);
-const FINE: f64 = 1e-3;
+
+/// Wanted error of an image, relative to the reference radiance, below which pixels are divided into more parts.
+const FINE_PIXELS: f64 = 1e-3;
 
 /// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
 /// are up to so many times the error wanted.
@@ -629,7 +635,7 @@ impl<'a> Painter<'a, '_> {
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
         let goal = 0.7 * goal;
-        let parts = if solved.settings.budget.image < FINE { PIXEL_PARTS.1 } else { PIXEL_PARTS.0 };
+        let parts = if solved.settings.budget.image < FINE_PIXELS { PIXEL_PARTS.1 } else { PIXEL_PARTS.0 };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;

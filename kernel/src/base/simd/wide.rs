@@ -50,6 +50,8 @@ pub trait WideTask {
 
 /// What a positive normal number's bits say besides its fraction.
 const FRACTION: u64 = (1 << 52) - 1;
+
+/// Exponent bits of numbers in [1, 2).
 const EXPONENT_OF_ONE: u64 = 1023 << 52;
 /// 2^52: its fraction's bits hold an integer.
 const INTEGER: u64 = 1075 << 52;

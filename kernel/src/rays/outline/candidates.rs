@@ -16,8 +16,10 @@ use crate::scene::Scene;
 /// The most edges that are looked at for one facet: where more may be outlines, rays cost less.
 const OUTLINE_EDGES_MOST: usize = 1024;
 
-/// Blocks of one facet at most, and facets over its pole.
+/// Most blocks of edges of one facet.
 const CANDIDATE_BLOCKS: usize = if KEEPS_OUTLINES { OUTLINE_EDGES_MOST / WIDTH } else { 0 };
+
+/// Most facets over the pole of one facet.
 const POLES: usize = if KEEPS_OUTLINES { 512 } else { 0 };
 
 /// Lists that are kept for each facet that would need all of that.

@@ -20,15 +20,18 @@ const CIRCLE_SETS: usize = 4;
 /// Error of the mean over that of independent parts: they fill one another's gaps.
 const CIRCLE_SETS_CORRELATION: f64 = 0.6;
 
-/// The least error of one set over what it finds, and the power of the number of sets by which that falls: of outlines that
-/// cross at random.
+/// Least relative error of the overlap that one set of circles finds, of outlines that cross at random.
 const CIRCLES_ERROR_LEAST: f64 = 0.1;
-const POWER: f64 = 1.7;
 
-/// Error of one set where half circles meet more than [`SIMPLE`] outlines, or outlines of several bodies, and none covers
-/// another: what does lies between circles. It falls with the square of their number.
+/// Power of the number of sets with which that error falls.
+const CIRCLES_ERROR_POWER: f64 = 1.7;
+
+/// Error of one set where half circles meet more than [`SIMPLE_OUTLINES_MOST`] outlines, or outlines of several bodies, and
+/// none covers another: an overlap may lie between circles. It falls with the square of the number of sets.
 const MISSED: f64 = 4e-3;
-const SIMPLE: usize = 2;
+
+/// Most outlines on a half circle for which no overlap can lie between circles.
+const SIMPLE_OUTLINES_MOST: usize = 2;
 
 /// The most sets.
 const MOST_SETS: u32 = 16;
@@ -95,9 +98,10 @@ pub(super) fn look(
         let means = sums.map(|sums| sums[0] / lines);
         // lines that agree by chance do not end it
         let amounts = [means[0].abs(), means[1].min(1.0 - means[1])];
-        let missed = if most > SIMPLE || !one { MISSED / f64::from(sets * sets) } else { 0.0 };
-        let least =
-            |k: usize| (CIRCLES_ERROR_LEAST * amounts.at(k) * pow(f64::from(sets), -POWER)).max(missed);
+        let missed = if most > SIMPLE_OUTLINES_MOST || !one { MISSED / f64::from(sets * sets) } else { 0.0 };
+        let least = |k: usize| {
+            (CIRCLES_ERROR_LEAST * amounts.at(k) * pow(f64::from(sets), -CIRCLES_ERROR_POWER)).max(missed)
+        };
         let error = |k: usize| spread(&parts[k], lines).max(least(k));
         let errors = [error(0), error(1)];
         let is_open = errors[1] < errors[0];

@@ -1,5 +1,7 @@
-//! Where an element is far larger than what stands about a point of it, in a view that shows that: rows, whose rays leave
-//! all of an element, can have missed it, and its linear function tells nothing of its surroundings.
+//! Points near geometry that is much smaller than their element.
+//!
+//! The coupling samples an element as a whole and may have missed such detail, and the linear function over the element
+//! does not show its shadow. Where an image resolves the detail, final gathering ([`super::gather`]) is used instead.
 
 use super::Solved;
 use super::gather::GATHERS;
@@ -9,22 +11,34 @@ use crate::base::math::{Vec3, frame, sqrt};
 use crate::rays::bvh::HalfSpace;
 use crate::rays::surface::Surface;
 
-/// What irradiance over pi may be wrong by beside such things, relative to the reference radiance.
+/// Error of irradiance over pi that is assumed beside fine detail, relative to the reference radiance.
+///
+/// A shadow of a thin object changes the irradiance by about this much. `cargo run --release --example calibrate` compares the
+/// estimates with true errors.
 pub(super) const FINE_DETAIL_ERROR: f64 = 0.1;
 
-/// Pixels that an element fills from which on a view may show what its rays have missed.
-const PIXELS: f64 = 16.0;
+/// Area of an element, in pixels, above which an image may resolve what the element's rays have missed.
+const DETAIL_PIXELS_LEAST: f64 = 16.0;
 
-/// Facets are small up to this part of an element's size, and near up to so many times their own.
+/// Longest edge of a facet that counts as fine detail, as a share of the root of the element's area.
+///
+/// Rays of a row, spread over the element, meet what is larger.
 const DETAIL_SIZE_MOST: f64 = 0.125;
+
+/// Largest distance of fine detail from a point, in longest edges of the detail: its shadow is faint beyond.
 const DETAIL_DISTANCE_MOST: f64 = 5.0;
 
-/// Facets that are looked at. Where there are more, they count as small things if the element fills so many pixels that the
-/// view is of its surroundings, else as parts of larger ones.
+/// Most facets that are examined about one point.
+///
+/// If there are more, they count as fine detail where the element fills [`CROWDED_PIXELS_LEAST`], else as parts of larger
+/// objects.
 const DETAIL_FACETS_MOST: u32 = 64;
-const LARGE: f64 = 256.0;
 
-/// Elements that are remembered.
+/// Area of an element, in pixels, above which many facets near a point count as fine detail: the view is then of the
+/// element's surroundings.
+const CROWDED_PIXELS_LEAST: f64 = 256.0;
+
+/// Number of elements whose answers are kept.
 const DETAIL_ELEMENTS_KEPT: usize = if GATHERS { 64 } else { 0 };
 
 plain_table! {
@@ -55,10 +69,10 @@ impl Solved<'_> {
         let pixel = area + per_square * far * far;
         let near = |many: bool| Near { normal: surface.normal, size: sqrt(element), many };
         GATHERS
-            && element > PIXELS * pixel
+            && element > DETAIL_PIXELS_LEAST * pixel
             && self.bvh.is_own()
             && self.element_has_fine_detail(unknown, &near(true), known)
-            && self.finds_small_facets(&near(element > LARGE * pixel), &[surface.point; 3])
+            && self.finds_small_facets(&near(element > CROWDED_PIXELS_LEAST * pixel), &[surface.point; 3])
     }
 
     /// The same of any of its points, or because there are too many facets to tell.

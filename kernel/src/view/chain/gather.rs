@@ -37,8 +37,10 @@ pub(super) const GATHER_RAYS_FEWEST: (f64, f64) = (32.0, 128.0);
 /// Most rays from a point.
 const GATHER_RAYS_MOST: f64 = 65536.0;
 
-/// The fewest and the most, in rays that half a bright hemisphere takes.
-const LEAST_TIMES: f64 = 0.25;
+/// Fewest rays from a point, as a factor on [`usual_rays`] at the standard deviation that is expected there.
+const GATHER_RAYS_FACTOR_LEAST: f64 = 0.25;
+
+/// Most rays from a point, as a factor on [`usual_rays`]: beyond, more rays bring less than finer elements would.
 const GATHER_RAYS_FACTOR_MOST: f64 = 4.0;
 
 /// Parts of them.
@@ -317,7 +319,7 @@ impl Solved<'_> {
         let goal = (GOAL * tolerance) * (GOAL * tolerance);
         let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST.0 } else { GATHER_RAYS_FEWEST.1 };
         let least = clamp(
-            LEAST_TIMES * usual_rays(tolerance / self.spread_at(gather_point)),
+            GATHER_RAYS_FACTOR_LEAST * usual_rays(tolerance / self.spread_at(gather_point)),
             fewest,
             GATHER_RAYS_MOST,
         );
