@@ -6,7 +6,7 @@ mod support;
 
 use blik_kernel::arena::Memory;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
-use blik_kernel::chain::{RaySample, Solved, Terms};
+use blik_kernel::chain::{PixelArea, RaySample, Solved, Terms};
 use blik_kernel::form_factor::point_to_polygon;
 use blik_kernel::host::Settings;
 use blik_kernel::image::{Target, rows, scratch_bytes};
@@ -91,7 +91,7 @@ fn views_from_near_show_what_stands_there() {
         Case::new(mesh, &materials).sky(SkyOf::uniform(1)).with_lit(1, &within(tolerance), |_, lit| {
             let mut near = lit.solved();
             // parallel rays through pixels of a twentieth of the cube
-            near.settings.pixel = ((size / 20.0) * (size / 20.0), 0.0);
+            near.settings.pixel = PixelArea { start: (size / 20.0) * (size / 20.0), growth: 0.0 };
             let middle = Vec3::new(0.2, -0.3, 0.0);
             let wall = [[-0.5, 0.0], [-0.5, 1.0], [0.5, 1.0], [0.5, 0.0]];
             let mut worst = [0.0f64; 2];

@@ -146,6 +146,18 @@ fn there(block: *const c_void) -> Result<*const u8, blik_error> {
     if block.is_null() { Err(blik_error::of(BLIK_ERROR_NULL)) } else { Ok(block.cast()) }
 }
 
+/// The table of a block's parts, all empty yet, in memory for which [`load_bytes`] counted room.
+fn block_table(memory: &'static mut [u8], parts: usize) -> &'static mut [Block<'static>] {
+    let start = memory.as_mut_ptr();
+    let table = start.wrapping_add(start.align_offset(align_of::<Block<'_>>())).cast::<Block<'static>>();
+    for i in 0..parts {
+        // SAFETY: `load_bytes` counted room for them.
+        unsafe { table.add(i).write(Block::EMPTY) };
+    }
+    // SAFETY: all have just been written.
+    unsafe { core::slice::from_raw_parts_mut(table, parts) }
+}
+
 /// Checks a block from end to end and makes handles over it. A block that is damaged or hostile is refused by
 /// `BLIK_ERROR_BLOCK`.
 ///
@@ -184,14 +196,7 @@ pub unsafe extern "C" fn blik_load(
         let (scene_at, rest) = place::<blik_scene>(memory)?;
         let (coupling_at, rest) = place::<blik_coupling>(rest)?;
         let (solution_at, rest) = place::<blik_solution>(rest)?;
-        let table = rest.as_mut_ptr();
-        let table = table.wrapping_add(table.align_offset(align_of::<Block<'_>>())).cast::<Block<'static>>();
-        for i in 0..parts {
-            // SAFETY: `load_bytes` counted room for them.
-            unsafe { table.add(i).write(Block::EMPTY) };
-        }
-        // SAFETY: all have just been written.
-        let table = unsafe { core::slice::from_raw_parts_mut(table, parts) };
+        let table = block_table(rest, parts);
         let baked = Baked::load(block, Isa::detect(), table)?;
         let lit = match &baked.solution {
             Some(solution) => Some((*solution, solution.light(baked.scene.bands())?)),

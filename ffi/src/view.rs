@@ -553,7 +553,7 @@ pub unsafe extern "C" fn blik_signatures(
             (views.checked_mul(bands).ok_or(too_many)?, views.checked_mul(3).ok_or(too_many)?);
         // SAFETY: by the caller's promise.
         let (directions, out) = unsafe {
-            let out = Signatures::new(signatures, (signature_count, all), signature_stride)?;
+            let out = Signatures::new(signatures, signature_count, all, signature_stride)?;
             (input(directions, numbers)?, out)
         };
         let cells = if cells == 0 {
@@ -594,7 +594,8 @@ impl Signatures {
     /// `at` is null or has room for `count` entries of `stride` bytes.
     unsafe fn new(
         at: *mut blik_signature,
-        (count, wanted): (usize, usize),
+        count: usize,
+        wanted: usize,
         stride: usize,
     ) -> Result<Signatures, blik_error> {
         let refused = |status| blik_error::of(status).field(BLIK_FIELD_SIGNATURES);

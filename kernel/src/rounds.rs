@@ -7,8 +7,11 @@ use crate::view::chain::GATHERS;
 /// Most rounds of one image.
 const ROUNDS: u32 = 3;
 
-/// Least and largest ratio of a round's tolerance to the one before: half the tolerance takes some four times as long.
-const STEPS: (f64, f64) = (0.3, 0.7);
+/// Least ratio of a round's tolerance to the one before: half the tolerance takes some four times as long.
+const ROUND_STEP_LEAST: f64 = 0.3;
+
+/// Largest ratio of a round's tolerance to the one before: a round that is hardly finer is not worth its start.
+const ROUND_STEP_MOST: f64 = 0.7;
 
 /// Ratio of a round's error estimate to the one before above which no other round follows, once the solution is as fine as
 /// asked: the next would gain as little.
@@ -65,12 +68,12 @@ pub fn next_tolerance(asked: f64, last: &Round, before: Option<&Round>, rounds: 
     let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
     let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
     let most = (last.rays as f64 / ROUND_RAYS_MOST).max(last.bytes as f64 / ROUND_BYTES_MOST);
-    let least = STEPS.0.min(asked / last.tolerance).max(sqrt(most));
+    let least = ROUND_STEP_LEAST.min(asked / last.tolerance).max(sqrt(most));
     // no ray was traced, as every row is in closed form: finer ones are as cheap
     let wanted = if coarse && last.rays == 0 { asked / last.tolerance } else { asked / last.estimate };
-    let step = wanted.min(STEPS.1).max(least);
+    let step = wanted.min(ROUND_STEP_MOST).max(least);
     let next = step * last.tolerance;
-    (!done && step <= STEPS.1 && check_tolerance(next).is_ok()).then_some(next)
+    (!done && step <= ROUND_STEP_MOST && check_tolerance(next).is_ok()).then_some(next)
 }
 
 /// As [`next_tolerance`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.

@@ -12,7 +12,7 @@ use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::TableShape;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
-use crate::view::chain::ChainSettings;
+use crate::view::chain::{ChainSettings, PixelArea};
 
 /// What a caller asks of the stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl Settings {
             max_bounces: self.max_bounces,
             gather: gathering,
             rays: (rays as f64 * finer * growth) as u64,
-            pixel: (f64::INFINITY, 0.0),
+            pixel: PixelArea::INFINITE,
             apart: false,
         }
     }

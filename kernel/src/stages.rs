@@ -47,7 +47,7 @@ pub trait Executor {
         // a divisor that needs no check
         let stride = NonZeroUsize::new(stride).unwrap_or(NonZeroUsize::MIN);
         let rows = (out.len() / stride).div_ceil((RANGES_PER_LANE * self.lanes()).max(1));
-        let rows = rows.clamp(RANGE_ROWS.0, RANGE_ROWS.1);
+        let rows = rows.clamp(RANGE_ROWS_FEWEST, RANGE_ROWS_MOST);
         self.pieces(out, rows * stride.get(), share, |number, part| {
             work(number * rows..number * rows + part.len() / stride, part)
         })
@@ -57,8 +57,11 @@ pub trait Executor {
 /// Ranges that a lane is given of each stage: enough that lanes which are done early find more.
 const RANGES_PER_LANE: usize = 16;
 
-/// Fewest and most rows of a range: below, starting it costs as much as the rows; above, progress is told too seldom.
-const RANGE_ROWS: (usize, usize) = (16, 4096);
+/// Fewest rows of a range: below, starting it costs as much as the rows.
+const RANGE_ROWS_FEWEST: usize = 16;
+
+/// Most rows of a range: above, progress is told too seldom.
+const RANGE_ROWS_MOST: usize = 4096;
 
 /// A result of ranges beside their output. Merging must give the same whatever the order.
 pub trait Merge: Default + Send {
@@ -96,11 +99,14 @@ pub const LANES_MOST: usize = 256;
 /// Rows that one piece of work fills: enough pieces to balance two dozen threads, large enough that a block's head does not
 /// count.
 pub fn block_rows(rows: usize) -> usize {
-    rows.div_ceil(ROW_BLOCKS).clamp(BLOCK_ROWS.0, BLOCK_ROWS.1)
+    rows.div_ceil(ROW_BLOCKS).clamp(BLOCK_ROWS_FEWEST, BLOCK_ROWS_MOST)
 }
 
 /// Number of blocks that the rows of a scene are split into: enough to balance two dozen threads.
 const ROW_BLOCKS: usize = 256;
 
-/// Fewest and most rows of one block: a block's head is not to count, and its memory is to be bounded.
-const BLOCK_ROWS: (usize, usize) = (16, 1024);
+/// Fewest rows of one block: its head is not to count.
+const BLOCK_ROWS_FEWEST: usize = 16;
+
+/// Most rows of one block: a bound on its memory.
+const BLOCK_ROWS_MOST: usize = 1024;

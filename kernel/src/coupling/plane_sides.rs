@@ -149,7 +149,8 @@ impl<'m> PlaneSides<'m> {
         &self,
         scene: &Scene<'_>,
         receiver: &Receiver,
-        (other, other_side): (usize, usize),
+        other: usize,
+        other_side: usize,
         tries: &mut u32,
     ) -> bool {
         let Receiver { facet, side, .. } = *receiver;
@@ -286,7 +287,7 @@ impl<'m> ProvenVisible<'m> {
                 if side < scene.sides()
                     && self.elements + count <= most
                     && plane_sides.is_alone(facet)
-                    && plane_sides.is_unoccluded(scene, receiver, (facet, side), &mut tries)
+                    && plane_sides.is_unoccluded(scene, receiver, facet, side, &mut tries)
                 {
                     insert(self.proven, facet * scene.sides() + side);
                     self.elements += count;
@@ -479,7 +480,7 @@ mod tests {
             between(x, |scene, plane_sides| {
                 let corners = scene.corners()[0];
                 let receiver = Receiver { facet: 0, side: 0, normal: Vec3::Z, corners };
-                found = Some(plane_sides.is_unoccluded(scene, &receiver, (1, 0), &mut { tries }));
+                found = Some(plane_sides.is_unoccluded(scene, &receiver, 1, 0, &mut { tries }));
                 assert!(plane_sides.before(0, 0).eq([1, 2]));
                 assert!((0..3).all(|f| plane_sides.is_alone(f)));
             });

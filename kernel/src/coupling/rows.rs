@@ -31,7 +31,7 @@ use crate::coupling::subdivide::INSIDE;
 use crate::rays::bvh::{Bvh, STREAM_RAYS};
 use crate::rays::inside::inside;
 use crate::rays::ray::{Hit, Ray};
-use crate::rays::surface::{Surface, opens_to_sky};
+use crate::rays::surface::{Mirror, Surface, opens_to_sky};
 use crate::scene::Scene;
 use core::f64::consts::SQRT_2;
 use core::ops::Range;
@@ -572,100 +572,169 @@ impl Tracer<'_, '_> {
         (origin.spawn_ray(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
     }
 
-    /// What ray number `tally.rays` of a row finds, of which the first hit is known, and its mirror chain.
+    /// Adds what ray number `tally.rays` of a row finds: its first hit, which is given, and its mirror chain. `None` where
+    /// the memory is full.
     #[inline]
     fn follow(
         &mut self,
         start: &Start,
         tally: &mut Tally,
-        (mut ray, mut met): (Ray, Option<Hit>),
+        (ray, met): (Ray, Option<Hit>),
         bin: usize,
         clear: Option<&ProvenVisible<'_>>,
     ) -> Option<()> {
-        let (part, index) = (tally.rays as usize % ELEMENT_PARTS, tally.rays / ELEMENT_PARTS as u32);
-        let sequence = &start.sequences[part];
-        let first = ray.direction;
+        let index = tally.rays / ELEMENT_PARTS as u32;
         *tally.bins.get_mut(bin)? += 1;
         // stands for the gradient until the row ends
-        let mut mark = [bin as f32, index as f32];
+        let mark = [bin as f32, index as f32];
+        let Some(hit) = met else {
+            return self.builder.push(Record::escape(self.kept(ray.direction), STRAIGHT, 1.0, mark));
+        };
+        let records = self.builder.used();
+        match self.first_hit(start, tally, (&ray, &hit), mark, clear)? {
+            Some(arrival) => self.follow_mirrors(start, tally, ray, arrival, records),
+            None => Some(()),
+        }
+    }
+
+    /// Counts the first hit of a ray, and adds the facet where it is not proven visible and entered in closed form. The inner
+    /// `None` where the ray ends there: inside a body, or on a black back.
+    #[inline]
+    fn first_hit(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        (ray, hit): (&Ray, &Hit),
+        mut mark: [f32; 2],
+        clear: Option<&ProvenVisible<'_>>,
+    ) -> Option<Option<Arrival>> {
+        let (bin, part) = (mark[0] as usize, tally.rays as usize % ELEMENT_PARTS);
+        let surface = Surface::of_hit(self.scene, hit);
+        tally.backs[bin] += u32::from(surface.is_none());
+        if tally.apart[bin] && inside(self.bvh, ray, self.scene.side_normal(start.facet, start.side)) {
+            tally.inside[bin] += 1;
+            return Some(None);
+        }
+        let sides = self.scene.sides();
+        let known = clear.zip(surface.as_ref()).is_some_and(|(c, s)| c.has(s.facet, s.side, sides));
+        if known {
+            if let Some(clear) = tally.clear.get_mut(part) {
+                *clear += 1;
+            }
+            let kind = surface.as_ref().and_then(|s| mirror_kind(self.scene.mirror(s.material)));
+            if let Some(kind) = kind
+                && let Some(rays) = tally.mirrored.get_mut(part).and_then(|all| all.get_mut(kind))
+            {
+                *rays += 1;
+                mark[0] += ((1 + kind) * ROW_BINS) as f32;
+            }
+        } else {
+            tally.blocked += 1;
+            self.builder.push(Record::escape(self.kept(ray.direction), BLOCKED, 1.0, mark))?;
+        }
+        let Some(surface) = surface else { return Some(None) };
+        if !known {
+            self.add_target(&surface, STRAIGHT, 1.0, mark)?;
+        }
+        Some(Some(Arrival { surface, mark }))
+    }
+
+    /// Follows a ray from mirror to mirror, from its first hit on; `records`: records before those of the ray.
+    ///
+    /// Eq. (12): each facet m that the chain meets couples to the row by phi prod rho_s, and so does the sky at its end.
+    #[inline]
+    fn follow_mirrors(
+        &mut self,
+        start: &Start,
+        tally: &mut Tally,
+        mut ray: Ray,
+        arrival: Arrival,
+        records: usize,
+    ) -> Option<()> {
+        let Arrival { mut surface, mark } = arrival;
+        let (part, index) = (tally.rays as usize % ELEMENT_PARTS, tally.rays / ELEMENT_PARTS as u32);
+        let sequence = &start.sequences[part];
         let (mut path, mut weight) = (STRAIGHT, 1.0);
-        let ray_start = self.builder.used();
         loop {
-            tally.chain_rays += u32::from(path != STRAIGHT);
-            let Some(hit) = met else {
-                let escape = Record::escape(self.kept(ray.direction), path, weight, mark);
-                return self.builder.push(escape);
-            };
-            let surface = Surface::of_hit(self.scene, &hit);
-            if path == STRAIGHT {
-                tally.backs[bin] += u32::from(surface.is_none());
-                if tally.apart[bin] && inside(self.bvh, &ray, self.scene.side_normal(start.facet, start.side))
-                {
-                    tally.inside[bin] += 1;
-                    return Some(());
-                }
-            }
-            let known = path == STRAIGHT
-                && clear
-                    .zip(surface.as_ref())
-                    .is_some_and(|(c, s)| c.has(s.facet, s.side, self.scene.sides()));
-            if known {
-                if let Some(clear) = tally.clear.get_mut(part) {
-                    *clear += 1;
-                }
-                let kind = surface.as_ref().and_then(|s| mirror_kind(self.scene.mirror(s.material)));
-                if let Some(kind) = kind
-                    && let Some(rays) = tally.mirrored.get_mut(part).and_then(|all| all.get_mut(kind))
-                {
-                    *rays += 1;
-                    mark[0] += ((1 + kind) * ROW_BINS) as f32;
-                }
-            } else if path == STRAIGHT {
-                tally.blocked += 1;
-                self.builder.push(Record::escape(self.kept(first), BLOCKED, 1.0, mark))?;
-            }
-            let Some(surface) = surface else { return Some(()) };
-            let target = self.elements.locate(surface.facet, surface.side, hit.u, hit.v);
-            if self.scene.glows(surface.material) && !known {
-                self.builder.push(Record::target(target, path, weight, mark))?;
-            }
-            let Some(mirror) = surface.mirror(self.scene) else { return Some(()) };
             let depth = self.builder.paths.get(path).depth;
-            if depth >= self.settings.mirrors {
-                let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
-                let rest = weight * self.builder.paths.largest(path) * rho;
-                tally.truncated_weight += rest;
-                if depth as usize >= MIRRORS_MOST {
-                    self.builder.close(ray_start, rest);
-                }
+            let Some((next, mirror)) = self.next_mirror(&surface, (path, depth), weight, records, tally)?
+            else {
                 return Some(());
-            }
-            let next = match self.builder.extend_path(path, mirror.class, self.scene) {
-                Ok(next) => next,
-                Err(true) => {
-                    tally.truncated_weight += weight * self.builder.paths.largest(path);
-                    return Some(());
-                }
-                Err(false) => return None,
             };
-            if self.builder.paths.largest(next) * weight < self.settings.cutoff {
-                let rest = weight * self.builder.paths.largest(next);
-                tally.truncated_weight += rest;
-                self.builder.close(ray_start, rest);
-                return Some(());
-            }
             let (s, t) = lobe_point(sequence, index, depth);
             let (direction, share) = surface.sample_reflection(self.scene, &mirror, ray.direction, s, t);
-            path = next;
-            weight *= share;
+            (path, weight) = (next, weight * share);
             ray = surface.spawn_ray(direction);
-            met = self.bvh.closest(&ray);
+            tally.chain_rays += 1;
+            let Some(hit) = self.bvh.closest(&ray) else {
+                return self.builder.push(Record::escape(self.kept(direction), path, weight, mark));
+            };
+            let Some(next) = Surface::of_hit(self.scene, &hit) else { return Some(()) };
+            surface = next;
+            self.add_target(&surface, path, weight, mark)?;
         }
+    }
+
+    /// The path with the mirror at `surface` added. The inner `None` where the chain ends: there is no mirror, or what is left
+    /// of the light is below the cutoff or beyond the largest number of mirrors; that rest is counted, and added as if the
+    /// chain went on as it went so far.
+    #[inline]
+    fn next_mirror(
+        &mut self,
+        surface: &Surface,
+        (path, depth): (u16, u32),
+        weight: f64,
+        records: usize,
+        tally: &mut Tally,
+    ) -> Option<Option<(u16, Mirror)>> {
+        let Some(mirror) = surface.mirror(self.scene) else { return Some(None) };
+        if depth >= self.settings.mirrors {
+            let rho = self.scene.specular(surface.material).iter().fold(0.0, |a, &b| f64::max(a, b));
+            let rest = weight * self.builder.paths.largest(path) * rho;
+            tally.truncated_weight += rest;
+            if depth as usize >= MIRRORS_MOST {
+                self.builder.close(records, rest);
+            }
+            return Some(None);
+        }
+        let next = match self.builder.extend_path(path, mirror.class, self.scene) {
+            Ok(next) => next,
+            Err(true) => {
+                tally.truncated_weight += weight * self.builder.paths.largest(path);
+                return Some(None);
+            }
+            Err(false) => return None,
+        };
+        let rest = weight * self.builder.paths.largest(next);
+        if rest < self.settings.cutoff {
+            tally.truncated_weight += rest;
+            self.builder.close(records, rest);
+            return Some(None);
+        }
+        Some(Some((next, mirror)))
+    }
+
+    /// Adds a facet that emits or reflects diffusely, seen along a path.
+    #[inline]
+    fn add_target(&mut self, surface: &Surface, path: u16, weight: f64, mark: [f32; 2]) -> Option<()> {
+        if !self.scene.glows(surface.material) {
+            return Some(());
+        }
+        let target = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
+        self.builder.push(Record::target(target, path, weight, mark))
     }
 
     fn kept(&self, direction: Vec3) -> Option<Vec3> {
         self.settings.directional.then_some(direction)
     }
+}
+
+/// The first hit of a ray, from which mirrors may send it on.
+struct Arrival {
+    surface: Surface,
+    /// What stands for the gradient of the ray's records until the row ends: the bin, and the kind of mirror where the facet
+    /// is proven visible; the ray's number in its part.
+    mark: [f32; 2],
 }
 
 /// Rays that a row needs when `blocked` of its first `rays` met something: the error goes with the square root of

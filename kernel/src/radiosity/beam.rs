@@ -36,8 +36,11 @@ pub struct BeamSettings {
     pub mirrors: u32,
 }
 
-/// Fewest and most rays of one facet.
-const FACET_BEAM_RAYS: (f64, f64) = (16.0, 65536.0);
+/// Fewest rays from one facet toward the sun: what small mirrors throw is met at all.
+const FACET_BEAM_RAYS_FEWEST: f64 = 16.0;
+
+/// Most rays from one facet toward the sun: its sequence has 2^16 points.
+const FACET_BEAM_RAYS_MOST: f64 = 65536.0;
 
 impl BeamSettings {
     /// About `rays` rays in all, spread over the mirrors that face the sun by the area that it sees.
@@ -58,7 +61,7 @@ const FOLD: usize = 1024;
 /// About the records that one row needs while it grows: two for each ray, or twice as many as there are different ones.
 pub fn unmerged(scene: &Scene<'_>, elements: &Elements<'_>, settings: &BeamSettings) -> usize {
     let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
-    let rays = (clamp(largest * settings.density, FACET_BEAM_RAYS.0, FACET_BEAM_RAYS.1) as usize)
+    let rays = (clamp(largest * settings.density, FACET_BEAM_RAYS_FEWEST, FACET_BEAM_RAYS_MOST) as usize)
         .next_power_of_two();
     (2 * rays).min(FOLD + elements.unknowns().saturating_mul(8))
 }
@@ -115,7 +118,7 @@ impl Tracer<'_, '_> {
             self.builder.end_row(Row::default(), Some, Record::join_beam);
             return Some(());
         }
-        let wanted = clamp(area * self.settings.density, FACET_BEAM_RAYS.0, FACET_BEAM_RAYS.1);
+        let wanted = clamp(area * self.settings.density, FACET_BEAM_RAYS_FEWEST, FACET_BEAM_RAYS_MOST);
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
@@ -307,7 +310,7 @@ pub fn add(
                     let irradiance = sun.irradiance(band) * product * (record.weight / visible_share);
                     *e += irradiance;
                     if image != 0 {
-                        images.add(shape, (unknown, level), band, irradiance);
+                        images.add(shape, unknown, level, band, irradiance);
                     }
                 }
             }

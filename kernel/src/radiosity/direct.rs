@@ -176,14 +176,20 @@ fn add_escapes<L: Lanes>(
     }
 }
 
-/// Points on an element at which the sun is tested: all of the first share agree, or all are taken.
-const SUN_POINTS: (u32, u32) = (16, 128);
+/// Points of an element at which the sun is tested first: where all agree, they are enough.
+const SUN_POINTS_LEAST: u32 = 16;
+
+/// Points of an element partly in shadow at which the sun is tested: its share is wrong by about 128^-3/4 = 2.6 %.
+const SUN_POINTS_MOST: u32 = 128;
 
 /// Rays toward the sun that are traced together: they wait on the stack, which is small where there is no standard library.
 const SUN_BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
 
-/// Mean over each element side of `range` of cos(sun) V, the part of the sun's normal irradiance that arrives
-/// straight; of an element partly inside a body, over the rest. Rows that the coupling left out get 0. Elements partly in shadow: 128 points, error about 128^-3/4 = 2.6 %. Returns the rays traced.
+/// Mean of cos(theta_sun) V over each element side of `range`: the share of the sun's normal irradiance that arrives
+/// straight, 1; of an element partly inside a body, the mean over the rest of it. Returns the rays traced.
+///
+/// Rows that the coupling left out get 0. The error is 0 for elements in full light or shadow, and about 2.6 % of the cosine
+/// at [`SUN_POINTS_MOST`] points for others.
 pub fn sun_rows(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,
@@ -196,13 +202,13 @@ pub fn sun_rows(
     if out.len() != span(&range) {
         return Err(Error::Length { what: "sun table", expected: span(&range), given: out.len() });
     }
+    let toward = [Ray::new(Vec3::ZERO, Vec3::Z); SUN_BATCH];
+    let mut probe =
+        SunProbe { scene, bvh, elements, sun, toward, shares: [0.0; SUN_BATCH], hidden: [false; SUN_BATCH] };
     let mut rays = 0;
-    let mut toward = [Ray::new(Vec3::ZERO, Vec3::Z); SUN_BATCH];
-    let (mut shares, mut hidden) = ([0.0; SUN_BATCH], [false; SUN_BATCH]);
     for ((unknown, row), value) in coupling.rows(range).zip(out) {
         let (facet, side) = elements.facet_of(unknown);
-        let normal = scene.side_normal(facet, side);
-        let cosine = sun.cosine(normal);
+        let cosine = sun.cosine(scene.side_normal(facet, side));
         *value = 0.0;
         if row.row.state == ABSENT || cosine <= 0.0 {
             continue;
@@ -211,41 +217,69 @@ pub fn sun_rows(
             *value = cosine;
             continue;
         }
-        let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
-        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS.0);
-        while count < goal {
-            let batch = (goal - count).min(SUN_BATCH as u32);
-            let mut kept = 0;
-            for n in count..count + batch {
-                let (p, q) = sequence.pair(n, 0);
-                let (a, b) = triangle(p, q);
-                let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
-                let (s, t) = sequence.pair(n, 2);
-                let ray = Surface::new(scene, facet, side, u, v).spawn_ray(sun.sample(s, t));
-                let share = sun.share(ray.direction, normal);
-                if share > 0.0 {
-                    toward.set(kept, ray);
-                    shares.set(kept, share);
-                    kept += 1;
-                }
-            }
-            bvh.occluded_many(toward.head(kept), hidden.head_mut(kept));
-            for (share, hidden) in shares.head(kept).iter().zip(&hidden) {
-                all += share;
-                lit += if *hidden { 0.0 } else { *share };
-            }
-            count += batch;
-            if count == SUN_POINTS.0 && lit != 0.0 && lit != all {
-                goal = SUN_POINTS.1;
-            }
-        }
+        let (share, count) = probe.lit_share(unknown);
         rays += u64::from(count);
-        let share = if all > 0.0 { lit / all } else { 0.0 };
         let visible_share = f64::from(row.row.visible_share);
         // inside a body: what falls there matters to nothing
         *value = if visible_share > 0.0 { cosine * (share / visible_share).min(1.0) } else { 0.0 };
     }
     Ok(rays)
+}
+
+/// Tests which share of the sun elements see, with room for the rays that are traced together.
+struct SunProbe<'a> {
+    scene: &'a Scene<'a>,
+    bvh: &'a Bvh<'a>,
+    elements: &'a Elements<'a>,
+    sun: &'a Sun<'a>,
+    toward: [Ray; SUN_BATCH],
+    /// Share of the disc that each ray stands for.
+    shares: [f64; SUN_BATCH],
+    hidden: [bool; SUN_BATCH],
+}
+
+impl SunProbe<'_> {
+    /// Share of the sun's light on an unknown that nothing hides, the mean over its points; and the points.
+    fn lit_share(&mut self, unknown: usize) -> (f64, u32) {
+        let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
+        let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS_LEAST);
+        while count < goal {
+            let batch = (goal - count).min(SUN_BATCH as u32);
+            let kept = self.aim(unknown, &sequence, count..count + batch);
+            self.bvh.occluded_many(self.toward.head(kept), self.hidden.head_mut(kept));
+            for (share, hidden) in self.shares.head(kept).iter().zip(&self.hidden) {
+                all += share;
+                lit += if *hidden { 0.0 } else { *share };
+            }
+            count += batch;
+            if count == SUN_POINTS_LEAST && lit != 0.0 && lit != all {
+                goal = SUN_POINTS_MOST;
+            }
+        }
+        (if all > 0.0 { lit / all } else { 0.0 }, count)
+    }
+
+    /// Rays from points of an unknown toward the sun, those of `numbers` that leave it; returns how many.
+    fn aim(&mut self, unknown: usize, sequence: &Sequence, numbers: Range<u32>) -> usize {
+        let SunProbe { scene, elements, sun, toward, shares, .. } = self;
+        let (facet, side) = elements.facet_of(unknown);
+        let normal = scene.side_normal(facet, side);
+        let mut kept = 0;
+        for n in numbers {
+            let (p, q) = sequence.pair(n, 0);
+            let (a, b) = triangle(p, q);
+            let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
+            let (s, t) = sequence.pair(n, 2);
+            let ray = Surface::new(scene, facet, side, u, v).spawn_ray(sun.sample(s, t));
+            let share = sun.share(ray.direction, normal);
+            if share > 0.0 {
+                toward.set(kept, ray);
+                shares.set(kept, share);
+                kept += 1;
+            }
+        }
+        kept
+    }
 }
 
 /// Adds irradiances (`bands` values an unknown) to the means in a table of one level.

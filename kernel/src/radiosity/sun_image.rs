@@ -13,15 +13,18 @@ use crate::base::octahedron;
 use crate::coupling::Record;
 use crate::radiosity::direct::TableShape;
 
-/// Room for images of all sides of facets together: where these are few, and for each.
-const ROOM: (usize, usize) = (1 << 14, 2);
+/// Room for images of all sides of facets together, where these are few.
+const IMAGES_ROOM_LEAST: usize = 1 << 14;
+
+/// Room for images of the sun, for each side of a facet.
+const IMAGES_ROOM_PER_SIDE: usize = 2;
 
 /// The most images of one side: each is looked for from every point.
 const SIDE_IMAGES_MOST: usize = 1024;
 
 /// Images for which `sides` sides of facets have room.
 fn room(sides: usize) -> usize {
-    sides.saturating_mul(ROOM.1).max(ROOM.0)
+    sides.saturating_mul(IMAGES_ROOM_PER_SIDE).max(IMAGES_ROOM_LEAST)
 }
 
 /// Places of one image: its direction; where the list goes on, and its [`Region`]; its [`Mirrors`].
@@ -345,7 +348,7 @@ impl SunImagesMut<'_> {
     }
 
     /// Adds irradiance of one band of an unknown on one level.
-    pub fn add(&mut self, shape: TableShape, (unknown, level): (usize, usize), band: usize, irradiance: f64) {
+    pub fn add(&mut self, shape: TableShape, unknown: usize, level: usize, band: usize, irradiance: f64) {
         if let Some(value) =
             self.reflected_irradiance.get_mut((unknown * shape.levels + level) * shape.bands + band)
         {
@@ -390,7 +393,7 @@ impl<'a> SunImages<'a> {
     /// Those that one of `sides` sides of facets may see from within `reach` of a point, where the
     /// light of each is spread over angles of the sine `spread`.
     #[inline]
-    pub fn near(&self, (sides, side): (usize, usize), point: Vec3, reach: f64, spread: f64) -> Nearby<'a> {
+    pub fn near(&self, sides: usize, side: usize, point: Vec3, reach: f64, spread: f64) -> Nearby<'a> {
         // more than the tangent over the longest distance in a scene
         let reach = reach + 2.0 * spread * SCENE_DIAMETER;
         Nearby { list: List::of(self.slots, sides, side), number: 0, point, reach }
@@ -422,7 +425,7 @@ impl<'a> SunImages<'a> {
 
     /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.
     #[inline]
-    pub fn mean(&self, shape: TableShape, side: usize, (unknown, level): (usize, usize)) -> &'a [f64] {
+    pub fn mean(&self, shape: TableShape, side: usize, unknown: usize, level: usize) -> &'a [f64] {
         if self.slots.is_empty() || !self.are_known(side) {
             return &[];
         }
@@ -437,7 +440,7 @@ impl<'a> SunImages<'a> {
         }
         for (unknown, values) in pieces(table, shape.stride()).enumerate() {
             for (level, part) in pieces(values, 3 * shape.bands).enumerate() {
-                let reflected_irradiance = self.mean(shape, side_of(unknown), (unknown, level));
+                let reflected_irradiance = self.mean(shape, side_of(unknown), unknown, level);
                 // rounding apart, no less than nothing is left
                 part.iter_mut()
                     .zip(reflected_irradiance)
@@ -454,7 +457,7 @@ mod tests {
     #[test]
     fn images_are_noted_once_and_too_many_are_means() {
         let sides = 3;
-        let mut slots = [0; 3 + 1 + IMAGE_PLACES * ROOM.0];
+        let mut slots = [0; 3 + 1 + IMAGE_PLACES * IMAGES_ROOM_LEAST];
         let mut reflected_irradiance = [1.0; 3];
         assert_eq!(places(sides), slots.len());
         let mut images_mut = SunImagesMut {

@@ -6,10 +6,12 @@ use crate::base::arena::ALIGNMENT;
 use crate::base::error::Error;
 use crate::base::index::IndexMut;
 use crate::coupling::{Block, Coupling, row_builder};
-use crate::radiosity::beam;
+use crate::radiosity::beam::{self, BeamSettings};
 use crate::radiosity::solution::SolutionMemory;
 use crate::radiosity::sun_image::SunImagesMut;
+use crate::scene::sun::Sun;
 use crate::settings;
+use core::ops::Range;
 
 /// Beams on their way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,8 +35,7 @@ impl Beams {
         memory: &mut [u8],
         run: &mut X,
     ) -> Result<(), X::Error> {
-        let Lighting { scene, bvh, elements, coupling, light, settings } = *of;
-        let shape = settings::shape(settings.max_bounces, scene.bands());
+        let Lighting { scene, elements, light, settings, .. } = *of;
         let mut images = SunImagesMut {
             slots: &mut *solution.slots,
             reflected_irradiance: &mut *solution.reflected_irradiance,
@@ -62,27 +63,12 @@ impl Beams {
             let range = |lane: usize| (first + lane * piece).min(all)..(first + (lane + 1) * piece).min(all);
             let share = 0.5 * SHARES[1] * (lanes * piece) as f64 / (all + lanes * piece) as f64;
             run.pieces(memory.head_mut(lanes * part), part, share, |lane, memory| {
-                // so that a block of no rows stands there where none fits
-                memory.head_mut(2 * ALIGNMENT).fill(0);
-                if range(lane).is_empty() {
-                    return Ok(());
-                }
-                match beam::fill(scene, bvh, elements, sun, &settings, range(lane), memory) {
-                    Ok(_) | Err(Error::BufferTooSmall { .. }) => Ok(()),
-                    Err(error) => Err(error),
-                }
+                fill_lane(of, sun, &settings, range(lane), memory)
             })?;
             for memory in memory.chunks(part.max(1)).take(lanes) {
-                let Ok(block) = Block::open(memory) else { break };
-                let done = block.range();
-                if done.start != self.rows || done.is_empty() {
+                if !self.take(memory, of, sun, scratch.direct, &mut images) {
                     break;
                 }
-                let block = [block];
-                let beams = Coupling::part(&block);
-                beam::add(&beams, (coupling, elements), sun, shape, scratch.direct, &mut images);
-                self.rays += beams.rows(done.clone()).map(|(_, r)| r.row.all_rays()).sum::<u64>();
-                self.rows = done.end;
             }
             if self.rows == first {
                 if lanes == 1 {
@@ -92,5 +78,46 @@ impl Beams {
             }
         }
         Ok(())
+    }
+    /// Adds the beams of a block where its rows are the next ones; false where they are not, or none fitted.
+    fn take(
+        &mut self,
+        memory: &[u8],
+        of: &Lighting<'_>,
+        sun: &Sun<'_>,
+        direct: &mut [f64],
+        images: &mut SunImagesMut<'_>,
+    ) -> bool {
+        let Ok(block) = Block::open(memory) else { return false };
+        let done = block.range();
+        if done.start != self.rows || done.is_empty() {
+            return false;
+        }
+        let block = [block];
+        let beams = Coupling::part(&block);
+        let shape = settings::shape(of.settings.max_bounces, of.scene.bands());
+        beam::add(&beams, (of.coupling, of.elements), sun, shape, direct, images);
+        self.rays += beams.rows(done.clone()).map(|(_, r)| r.row.all_rays()).sum::<u64>();
+        self.rows = done.end;
+        true
+    }
+}
+
+/// Fills a lane's memory with the beams of a range of sides, as far as they fit.
+fn fill_lane(
+    of: &Lighting<'_>,
+    sun: &Sun<'_>,
+    settings: &BeamSettings,
+    range: Range<usize>,
+    memory: &mut [u8],
+) -> Result<(), Error> {
+    // so that a block of no rows stands there where none fits
+    memory.head_mut(2 * ALIGNMENT).fill(0);
+    if range.is_empty() {
+        return Ok(());
+    }
+    match beam::fill(of.scene, of.bvh, of.elements, sun, settings, range, memory) {
+        Ok(_) | Err(Error::BufferTooSmall { .. }) => Ok(()),
+        Err(error) => Err(error),
     }
 }

@@ -64,15 +64,7 @@ pub(super) fn solve<'m, X: Executor>(
     images.take_off(shape, |unknown| elements.facet_side(unknown), irradiance);
     system.fill_absent_rows(irradiance);
     errors(&system, radiance, reference, (own, carried), variance, run)?;
-    // what no ray of a row has met may be a lamp
-    let glare = (0..shape.bands).filter(|band| *dark >> band & 1 == 1 && reference.at(*band) > 0.0);
-    let glare = glare.map(|band| scene.largest_emission(band) / reference.at(band)).fold(0.0, f64::max);
-    if glare > 1.0 {
-        for ((_, row), variance) in coupling.rows(0..variance.len()).zip(variance.iter_mut()) {
-            let unseen = accuracy::ROW_UNSEEN_RAYS * glare / f64::from(row.row.rays.max(1));
-            *variance += if row.row.rays > 0 { narrow(unseen * unseen) } else { 0.0 };
-        }
-    }
+    add_lamps(&system, reference, *dark, variance);
     for (unknown, (variance, spread)) in variance.iter_mut().zip(pieces(spread, SPREAD)).enumerate() {
         let known = images.are_known(elements.facet_side(unknown));
         *variance += narrow(sun_image::variance(spread, known));
@@ -97,6 +89,21 @@ pub(super) fn solve<'m, X: Executor>(
         variance,
         numbers,
     })
+}
+
+/// Adds to the expected squared errors that no ray of a row may have met a lamp: in those of the bands `dark`, as bits, in
+/// which lamps are brighter than the reference radiance.
+fn add_lamps(system: &System<'_>, reference: &[f64], dark: u64, variance: &mut [f32]) {
+    let bands = (0..system.shape.bands).filter(|band| dark >> band & 1 == 1 && reference.at(*band) > 0.0);
+    let glare =
+        bands.map(|band| system.scene.largest_emission(band) / reference.at(band)).fold(0.0, f64::max);
+    if glare <= 1.0 {
+        return;
+    }
+    for ((_, row), variance) in system.coupling.rows(0..variance.len()).zip(variance.iter_mut()) {
+        let unseen = accuracy::ROW_UNSEEN_RAYS * glare / f64::from(row.row.rays.max(1));
+        *variance += if row.row.rays > 0 { narrow(unseen * unseen) } else { 0.0 };
+    }
 }
 
 /// Expected squared error of each unknown; `own` and `carried` hold one and two values of each and of each band.

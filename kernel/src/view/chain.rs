@@ -19,6 +19,7 @@ use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::{FRAC_1_PI, floor, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::element::{Elements, Local};
+use crate::coupling::mirror_path::MIRRORS_MOST;
 use crate::coupling::row_builder::CLOSED_REMAINDER_MOST;
 use crate::radiosity::solution::Solution;
 use crate::rays::bvh::Bvh;
@@ -42,10 +43,29 @@ pub struct ChainSettings {
     pub gather: f64,
     /// Where mending all pixels is expected to take at most so many rays, all are.
     pub rays: u64,
-    /// Area of a pixel where rays start, and what the square of a ray's length adds to it.
-    pub pixel: (f64, f64),
+    /// Area of a pixel.
+    pub pixel: PixelArea,
     /// Whether what the first mirror or narrow lobe shows of the sun and its images is left out: it is found apart.
     pub apart: bool,
+}
+
+/// Area of a pixel at a distance r from where its rays start: `start + growth r^2`, in scene coordinates squared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelArea {
+    /// Area where rays start: of a parallel camera the area everywhere.
+    pub start: f64,
+    /// Solid angle that a pixel fills, of a central camera.
+    pub growth: f64,
+}
+
+impl PixelArea {
+    /// Too large for any detail to be resolved.
+    pub const INFINITE: PixelArea = PixelArea { start: f64::INFINITY, growth: 0.0 };
+
+    /// Area at a distance.
+    pub(super) fn at(&self, distance: f64) -> f64 {
+        self.start + self.growth * distance * distance
+    }
 }
 
 /// Lobes of this axis ratio and above are narrow: cells of a signature may miss their highlights.
@@ -67,8 +87,7 @@ impl ChainSettings {
         let ErrorBudget { solution, image, .. } = self.budget;
         let all = camera.columns() * camera.rows();
         let spread = scene.largest_diffuse() * gather::spread(reflected);
-        let each =
-            gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::GATHER_RAYS_FEWEST.0);
+        let each = gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::GATHER_RAYS_FEWEST);
         let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(AT_LEAST);
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
@@ -79,7 +98,12 @@ impl ChainSettings {
             self.gather * (solution / image).max(1.0)
         };
         let area = camera.pixel_area();
-        ChainSettings { gather, pixel: if camera.is_parallel() { (area, 0.0) } else { (0.0, area) }, ..self }
+        let pixel = if camera.is_parallel() {
+            PixelArea { start: area, growth: 0.0 }
+        } else {
+            PixelArea { start: 0.0, growth: area }
+        };
+        ChainSettings { gather, pixel, ..self }
     }
 
     /// The same for sums over so many rays that errors of single elements count little.
@@ -477,68 +501,112 @@ impl Solved<'_> {
             let surface = Surface::of_hit(self.scene, &met)?;
             self.add_diffuse(state, &surface, mode, terms, path);
             let mirror = surface.mirror(self.scene)?;
-            if self.settings.max_bounces.is_some_and(|most| state.mirrors >= most) {
+            if !self.advance(state, &surface, terms, path) {
                 return None;
             }
-            let specular = self.scene.specular(surface.material);
-            let bands = self.shape.bands;
-            let mut largest = 0.0;
-            for (throughput, rho) in state.throughput.head_mut(bands).iter_mut().zip(specular) {
-                *throughput *= rho;
-                largest = f64::max(largest, *throughput);
-            }
-            if largest * self.numbers.brightest < self.settings.budget.chains
-                || state.mirrors as usize >= crate::coupling::mirror_path::MIRRORS_MOST
-            {
-                path.tail += largest * self.numbers.brightest;
-                self.close(state, terms);
-                return None;
-            }
-            state.mirrors += 1;
+            // where sunlight is found apart, the first mirror's is
+            let apart = self.settings.apart && state.mirrors == 1;
             state.lobe = mirror.lobe.is_some()
                 || state.lobe && state.imaged && surface.flat_mirror(self.scene).is_some();
-            let apart = self.settings.apart && state.mirrors == 1;
-            if apart && mirror.lobe.is_none() {
-                (state.lobe, state.imaged) =
-                    (true, !self.images.slots.is_empty() && self.knows_images(&surface));
-            }
-            match &mirror.lobe {
+            hit = match &mirror.lobe {
                 None => {
-                    let direction = surface.mirrored(self.scene, state.ray.direction);
-                    state.ray = surface.spawn_ray(direction);
-                    if state.mirrors == 1
-                        && !state.sunless
-                        && mode.occluders.is_parallel()
-                        && !self.scene.is_smooth()
-                        && let Some(known) =
-                            mode.occluders.before(self, &surface, RayKind::Mirror, (direction, 0.0))
-                    {
-                        path.rays += u32::from(!known.is_empty());
-                        hit = self.bvh.closest_among(&state.ray, known);
-                        continue;
+                    if apart {
+                        let imaged = !self.images.slots.is_empty() && self.knows_images(&surface);
+                        (state.lobe, state.imaged) = (true, imaged);
                     }
+                    self.advance_mirror(state, &surface, mode, path)
                 }
                 Some(lobe) => {
                     if !(apart && lobe.ratio() >= APART) {
                         self.add_sun_gloss(state, &surface, &mirror, mode, terms, path);
                     }
-                    state.imaged = self.knows_images(&surface);
-                    state.lobes += 1;
-                    let asked = self.scene.gloss_rays(surface.material).is_some();
-                    path.sampled |= !asked;
-                    if state.lobes == 1
-                        && mode.branches
-                        && (asked || matches!(mode.sample, RaySample::Integrate(_)))
-                    {
+                    if !self.advance_lobe(state, &surface, &mirror, mode, path) {
                         return Some(met);
                     }
-                    let (u, v) = mode.sample.lobe_point(state.lobes);
-                    self.turn(state, &surface, &mirror, u, v);
+                    path.rays += 1;
+                    self.bvh.closest(&state.ray)
                 }
-            }
-            path.rays += 1;
-            hit = self.bvh.closest(&state.ray);
+            };
         }
+    }
+
+    /// Counts one more mirror: multiplies the throughput by its reflectance. False where the chain ends, at the largest
+    /// number of reflections or where it is too dim; what it could still bring is then in the path's tail.
+    #[inline]
+    fn advance(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) -> bool {
+        if self.settings.max_bounces.is_some_and(|most| state.mirrors >= most) {
+            return false;
+        }
+        // eq. (15): prod rho_s over the mirrors so far
+        let specular = self.scene.specular(surface.material);
+        let mut largest = 0.0;
+        for (throughput, rho) in state.throughput.head_mut(self.shape.bands).iter_mut().zip(specular) {
+            *throughput *= rho;
+            largest = f64::max(largest, *throughput);
+        }
+        if largest * self.numbers.brightest < self.settings.budget.chains
+            || state.mirrors as usize >= MIRRORS_MOST
+        {
+            path.tail += largest * self.numbers.brightest;
+            self.close(state, terms);
+            return false;
+        }
+        state.mirrors += 1;
+        true
+    }
+
+    /// Reflects the ray at an ideal mirror and finds what it meets: among the facets that are known to stand in its way,
+    /// where they are known, as for parallel rays.
+    #[inline]
+    fn advance_mirror(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        mode: &mut Mode<'_, '_>,
+        path: &mut Path,
+    ) -> Option<Hit> {
+        let direction = surface.mirrored(self.scene, state.ray.direction);
+        state.ray = surface.spawn_ray(direction);
+        if state.mirrors == 1
+            && !state.sunless
+            && mode.occluders.is_parallel()
+            && !self.scene.is_smooth()
+            && let Some(known) = mode.occluders.before(self, surface, RayKind::Mirror, (direction, 0.0))
+        {
+            path.rays += u32::from(!known.is_empty());
+            return self.bvh.closest_among(&state.ray, known);
+        }
+        path.rays += 1;
+        self.bvh.closest(&state.ray)
+    }
+
+    /// Chooses the ray of a lobe. False where the chain branches there instead: at its first lobe, where the ray stands for
+    /// itself or the material says how many rays it takes.
+    #[inline]
+    fn advance_lobe(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        mirror: &Mirror,
+        mode: &Mode<'_, '_>,
+        path: &mut Path,
+    ) -> bool {
+        state.imaged = self.knows_images(surface);
+        state.lobes += 1;
+        let asked = self.scene.gloss_rays(surface.material).is_some();
+        path.sampled |= !asked;
+        if state.lobes == 1 && mode.branches && (asked || matches!(mode.sample, RaySample::Integrate(_))) {
+            return false;
+        }
+        let (u, v) = mode.sample.lobe_point(state.lobes);
+        self.turn(state, surface, mirror, u, v);
+        true
     }
 
     /// The rest of a chain that is not followed any more: it is taken to go on as it went so far, S + t S + t^2 S ... =
@@ -683,7 +751,7 @@ impl Solved<'_> {
         }
     }
 
-    /// Diffuse radiance of a facet toward the chain.
+    /// Adds the diffuse radiance of a facet toward the chain, times the throughput: emission, and what arrives at the point.
     #[inline]
     fn add_diffuse(
         &self,
@@ -696,42 +764,32 @@ impl Solved<'_> {
         let bands = self.shape.bands;
         let to = if state.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
         let emission = self.scene.emission(surface.material);
-        to.iter_mut()
-            .zip(state.throughput.iter())
-            .zip(emission)
-            .for_each(|((to, throughput), own)| *to += throughput * own);
+        let emitted = to.iter_mut().zip(state.throughput.iter()).zip(emission);
+        emitted.for_each(|((to, throughput), own)| *to += throughput * own);
+        let Some(level) = self.level(state.mirrors) else { return };
         let diffuse = self.scene.diffuse(surface.material);
-        let level = match self.settings.max_bounces {
-            Some(most) if state.mirrors >= most => return,
-            Some(most) if self.shape.levels > 1 => (most - state.mirrors - 1) as usize,
-            _ => 0,
-        };
         if diffuse.iter().all(|&d| d == 0.0) {
             return;
         }
         let (unknown, local) = self.elements.locate(surface.facet, surface.side, surface.u, surface.v);
-        let level = level.min(self.shape.levels.saturating_sub(1));
-        let values = self.irradiance.part(self.shape.at(unknown, level));
         let sunlit = self.sun_cosine(state, surface, mode, path);
         let goes_on = self.goes_on(state, surface, unknown, mode.sample);
         let reflected_irradiance: &[f64] = if state.onward.is_some() && !goes_on {
-            // rays from a point are many, and each meets another place: what images give its element on the mean does
+            // rays from a point are many, and each meets another place: the mean over the element serves
             let side = surface.facet * self.scene.sides() + surface.side;
-            self.images.mean(self.shape, side, (unknown, level))
+            self.images.mean(self.shape, side, unknown, level)
         } else {
             if !self.images.slots.is_empty() {
                 self.add_images(state, surface, mode, to, path);
             }
             &[]
         };
+        let sun = self.light.sun.as_ref().filter(|_| sunlit > 0.0);
         if goes_on {
-            if sunlit > 0.0
-                && let Some(sun) = &self.light.sun
-            {
-                let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
-                own.enumerate().for_each(|(band, ((to, throughput), rho))| {
-                    *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
-                });
+            let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
+            for (band, ((to, throughput), rho)) in own.enumerate() {
+                let Some(sun) = sun else { break };
+                *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
             }
             return;
         }
@@ -739,55 +797,95 @@ impl Solved<'_> {
         for (throughput, rho) in state.throughput.iter().zip(diffuse) {
             weight = f64::max(weight, throughput * rho);
         }
+        let values = self.irradiance.part(self.shape.at(unknown, level));
+        let bounces = state.mirrors;
+        let point = GatherPoint { surface, unknown, values, local, weight, bounces, open: None };
+        // a ray from a point, or of a lobe
+        let counts_signs = state.gathered.is_none();
+        let gathered = state.gathered.as_deref_mut();
+        let arriving = self.arriving(&point, state.far, (gathered, state.images), mode, path);
+        let open = arriving.open.as_ref();
+        for (band, ((to, throughput), rho)) in
+            to.iter_mut().zip(state.throughput.iter()).zip(diffuse).enumerate()
+        {
+            let mut irradiance = held(values, bands, local, open, band);
+            irradiance = (irradiance + arriving.correction.at(band)).max(0.0);
+            irradiance += open.map_or(0.0, |open| open.irradiance.at(band)) + reflected_irradiance.at(band);
+            if let Some(sun) = sun {
+                irradiance += sunlit * sun.irradiance(band);
+            }
+            // eq. (15): I_d prod rho_s, with the reflected part of eq. (12), I_d = rho_d E/pi
+            let share = throughput * rho;
+            *to += share * FRAC_1_PI * irradiance;
+        }
+        path.variance += weight * weight * arriving.variance;
+        if counts_signs {
+            let error = weight * sqrt(arriving.variance);
+            path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
+        }
+    }
+
+    /// The level of the irradiance table that counts for a facet behind `mirrors` mirrors; `None` where its reflection is one
+    /// too many.
+    #[inline]
+    fn level(&self, mirrors: u32) -> Option<usize> {
+        let level = match self.settings.max_bounces {
+            Some(most) if mirrors >= most => return None,
+            Some(most) if self.shape.levels > 1 => (most - mirrors - 1) as usize,
+            _ => 0,
+        };
+        Some(level.min(self.shape.levels.saturating_sub(1)))
+    }
+
+    /// What is known at a point beyond its element's linear function: the straight sky, where the element's leaves too much
+    /// of it, and final gathering, where the element's expected error is too large.
+    #[inline]
+    fn arriving<'g>(
+        &'g self,
+        point: &GatherPoint<'_>,
+        far: f64,
+        (mut gathered, images): (Option<&'g mut Gathered>, &mut [[f64; MAX_BANDS]; 2]),
+        mode: &mut Mode<'_, '_>,
+        path: &mut Path,
+    ) -> Arriving<'g> {
+        let GatherPoint { surface, unknown, local, weight, .. } = *point;
         let mut variance = f64::from(self.variance.at(unknown));
-        let mut correction: &[f64] = &[];
-        if let Some(gathered) = state.gathered.as_deref_mut()
-            && self.has_fine_detail_nearby(surface, unknown, state.far, &mut gathered.details)
+        if let Some(gathered) = gathered.as_deref_mut()
+            && self.has_fine_detail_nearby(surface, unknown, far, &mut gathered.details)
         {
             variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
-        let by_element = self.straight.of(unknown, bands).map_or(0.0, |(_, variance)| variance);
+        let by_element = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
         let looks = self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element);
-        let open = match state.gathered.as_deref_mut() {
+        let open = match gathered.as_deref_mut() {
             Some(kept) if looks => {
                 self.open_in_pixel(surface, unknown, local, &mut kept.skies, mode.occluders)
             }
             _ => None,
         };
         variance += if open.is_some() { 0.0 } else { by_element };
+        let mut correction: &[f64] = &[];
         if self.wants_rays(surface, weight, variance)
-            && let Some(gathered) = state.gathered.as_deref_mut()
+            && let Some(gathered) = gathered
         {
-            let open = open.as_ref();
-            let gather_point =
-                GatherPoint { surface, unknown, values, local, weight, bounces: state.mirrors, open };
-            if let Some((near, left)) = self.gather(&gather_point, state.images, gathered, mode, path) {
+            let point = GatherPoint { open: open.as_ref(), ..*point };
+            if let Some((near, left)) = self.gather(&point, images, gathered, mode, path) {
                 (correction, variance) = (near, left);
             }
         }
         variance += open.as_ref().map_or(0.0, |open| open.variance);
-        for (band, ((to, throughput), rho)) in
-            to.iter_mut().zip(state.throughput.iter()).zip(diffuse).enumerate()
-        {
-            let mut irradiance = held(values, bands, local, open.as_ref(), band);
-            irradiance = (irradiance + correction.at(band)).max(0.0);
-            irradiance +=
-                open.as_ref().map_or(0.0, |open| open.irradiance.at(band)) + reflected_irradiance.at(band);
-            if sunlit > 0.0
-                && let Some(sun) = &self.light.sun
-            {
-                irradiance += sunlit * sun.irradiance(band);
-            }
-            let share = throughput * rho;
-            *to += share * FRAC_1_PI * irradiance;
-        }
-        path.variance += weight * weight * variance;
-        if state.gathered.is_none() {
-            // a ray from a point, or of a lobe
-            let error = weight * sqrt(variance);
-            path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
-        }
+        Arriving { open, correction, variance }
     }
+}
+
+/// What is known of the light at a point beyond its element's linear function.
+struct Arriving<'g> {
+    /// The straight sky.
+    open: Option<OpenAt<'g>>,
+    /// Irradiance that final gathering adds, one value per band; empty where it was not used.
+    correction: &'g [f64],
+    /// Expected squared error of irradiance over pi, relative to the reference radiance.
+    variance: f64,
 }
 
 /// Sets of signs of the errors of elements; all have the same sign in the last.

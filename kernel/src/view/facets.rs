@@ -29,7 +29,7 @@ pub fn side(
         let share = solved.elements.share(unknown) * f64::from(coupling.row(unknown).visible_share);
         let lit = sun.get(unknown).copied().unwrap_or(0.0);
         let reflected_irradiance =
-            solved.images.mean(shape, solved.elements.facet_side(unknown), (unknown, level));
+            solved.images.mean(shape, solved.elements.facet_side(unknown), unknown, level);
         for (band, (e, m)) in irradiance.iter_mut().zip(mean).enumerate() {
             let sun = solved.light.sun.as_ref().map_or(0.0, |s| s.irradiance(band));
             *e += (m + reflected_irradiance.get(band).copied().unwrap_or(0.0) + lit * sun) * share;

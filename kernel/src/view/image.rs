@@ -1,5 +1,6 @@
 //! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
 
+mod centres;
 mod line_integral;
 mod thin;
 
@@ -16,6 +17,7 @@ use crate::scene::MAX_BANDS;
 use crate::view::camera::{Camera, Sampling};
 use crate::view::chain::{ChainScratch, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
 use crate::view::raster::{Items, NO_FACET_DRAWN, UNSURE};
+use centres::Centres;
 use core::ops::Range;
 use line_integral::{Fineness, Measure, integrate};
 
@@ -74,7 +76,7 @@ pub struct Target<'o> {
 /// that some rows of centres meet.
 pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let width = camera.columns() + 2;
-    let need = Need::new().and::<f64>(3 * width * (3 * bands + PIXEL_NOTES)).and::<f64>(work(bands));
+    let need = Need::new().and::<f64>(Centres::size(camera.columns(), bands)).and::<f64>(work(bands));
     let need = need.and::<PixelScratch>(1).and::<Occluders>(OccluderCache::ROOM);
     Candidates::need(Items::need(need, width, DRAWN), CANDIDATE_FACETS_KEPT).bytes()
 }
@@ -99,9 +101,6 @@ fn work(bands: usize) -> usize {
     2 * line_integral::memory(3 * bands) + 3 * bands
 }
 
-/// Beside the three terms of a pixel's centre: object, variance, tail, sampled, unevenness.
-const PIXEL_NOTES: usize = 5;
-
 /// Fewest scattered rays through a pixel: fewer tell too little of their own spread.
 const SCATTER_RAYS_FEWEST: u32 = 8;
 
@@ -122,11 +121,13 @@ const PIXEL_UNSEEN_SHARE: f64 = 0.35;
 /// centres is likelier.
 const STEEP: f64 = 0.25;
 
-/// Parts into which first lines divide a pixel, and first places a line: for wanted errors from [`FINE_PIXELS`] on, and
-/// below.
+/// Parts into which first lines divide a pixel, and first places a line.
 ///
 /// Places are shifted from line to line. What reaches less far into a pixel than a part, and ends there, is missed.
-const PIXEL_PARTS: (usize, usize) = (4, 8);
+const PIXEL_PARTS: usize = 4;
+
+/// The same parts for wanted errors below [`FINE_PIXELS`].
+const PIXEL_PARTS_FINE: usize = 8;
 
 /// Wanted error of an image, relative to the reference radiance, below which pixels are divided into more parts.
 const FINE_PIXELS: f64 = 1e-3;
@@ -135,8 +136,11 @@ const FINE_PIXELS: f64 = 1e-3;
 /// are up to so many times the error wanted.
 const SCATTER_CONTRAST_MOST: f64 = 60.0;
 
-/// Narrowest parts between lines, and along them.
-const NARROWEST: (f64, f64) = (1.0 / 64.0, 1.0 / 4096.0);
+/// Narrowest distance of two lines, in pixels.
+const LINES_NARROWEST: f64 = 1.0 / 64.0;
+
+/// Narrowest distance of two places along a line, in pixels.
+const PLACES_NARROWEST: f64 = 1.0 / 4096.0;
 
 /// Lines of a pixel that has cost so many rays are not halved.
 const ENOUGH: u64 = 2048;
@@ -164,55 +168,10 @@ pub fn rows(
     if range.start > range.end || range.end > camera.rows() {
         return Err(Error::Range { field: Field::Rows, band: 0, value: range.end as f64 });
     }
-    let bands = solved.shape.bands;
-    let expected = range.len() * camera.columns() * bands;
-    if target.image.len() != expected {
-        return Err(Error::Length { what: "image", expected, given: target.image.len() });
-    }
-    for component in &target.components {
-        if !component.is_empty() && component.len() != expected {
-            return Err(Error::Length { what: "image component", expected, given: component.len() });
-        }
-    }
+    check(target, range.len() * camera.columns() * solved.shape.bands)?;
     let settings = solved.settings.of_image(camera, solved.scene, solved.numbers.reflected);
     let solved = &Solved { settings, ..*solved };
-    let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
-    let width = camera.columns() + 2;
-    let stride = 3 * bands + PIXEL_NOTES;
-    let area = camera.sampling() == Sampling::Area;
-    let centre_rows = arena.take::<f64>(if area { 3 * width * stride } else { 0 })?;
-    let work = arena.take::<f64>(work(bands))?;
-    let pixel =
-        arena.take::<PixelScratch>(1)?.first_mut().ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
-    pixel.work.gathered.start();
-    let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
-    let items = Items::new(&mut arena, width, DRAWN)?;
-    let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
-    let draws = solved.bvh.is_own()
-        && solved.scene.facets() / DRAWN_FACETS_PER_PIXEL <= camera.columns() * camera.rows();
-    let mut painter = Painter {
-        solved,
-        camera,
-        centre_rows,
-        work,
-        width,
-        stride,
-        pixel,
-        beside: false,
-        primary: Primary {
-            items,
-            draws,
-            drawn: 0..0,
-            last: range.end as isize + isize::from(area),
-            line: None,
-        },
-        occluders: OccluderCache::none(),
-        tally: Tally::default(),
-    };
-    if solved.bvh.is_own() {
-        painter.occluders = OccluderCache::new(lists, camera.is_parallel(), camera.pixel_area(), SUN_RAYS);
-    }
-    painter.occluders = painter.occluders.with_candidates(candidates);
+    let mut painter = Painter::new(solved, camera, range.end, scratch)?;
     if camera.is_parallel() {
         painter.look_beside();
     }
@@ -221,6 +180,19 @@ pub fn rows(
         Sampling::Area => painter.areas(range, target),
     }
     Ok(painter.tally)
+}
+
+/// Refuses outputs that do not have `expected` values.
+fn check(target: &Target<'_>, expected: usize) -> Result<(), Error> {
+    if target.image.len() != expected {
+        return Err(Error::Length { what: "image", expected, given: target.image.len() });
+    }
+    for component in target.components.iter().filter(|component| !component.is_empty()) {
+        if component.len() != expected {
+            return Err(Error::Length { what: "image component", expected, given: component.len() });
+        }
+    }
+    Ok(())
 }
 
 /// Rays toward the sun of a pixel, some more or less.
@@ -277,11 +249,8 @@ impl Primary<'_> {
 struct Painter<'a, 's> {
     solved: &'a Solved<'a>,
     camera: &'a Camera,
-    /// Three rows of pixel centres, with a column more on either side: three terms, then [`PIXEL_NOTES`].
-    centre_rows: &'s mut [f64],
+    centre_rows: Centres<'s>,
     work: &'s mut [f64],
-    width: usize,
-    stride: usize,
     pixel: &'s mut PixelScratch,
     /// Whether the latest pixel's centre shows the background, rather than [`PixelScratch::terms`].
     beside: bool,
@@ -290,7 +259,47 @@ struct Painter<'a, 's> {
     tally: Tally,
 }
 
-impl<'a> Painter<'a, '_> {
+impl<'a, 's> Painter<'a, 's> {
+    /// In scratch memory of [`scratch_bytes`]; rows from `end` on are not wanted.
+    fn new(
+        solved: &'a Solved<'a>,
+        camera: &'a Camera,
+        end: usize,
+        scratch: &'s mut [u8],
+    ) -> Result<Painter<'a, 's>, Error> {
+        let bands = solved.shape.bands;
+        let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
+        let area = camera.sampling() == Sampling::Area;
+        let size = if area { Centres::size(camera.columns(), bands) } else { 0 };
+        let centre_rows = Centres::new(arena.take::<f64>(size)?, camera.columns(), bands);
+        let work = arena.take::<f64>(work(bands))?;
+        let pixel = arena.take::<PixelScratch>(1)?.first_mut();
+        let pixel = pixel.ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
+        pixel.work.gathered.start();
+        let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
+        let items = Items::new(&mut arena, camera.columns() + 2, DRAWN)?;
+        let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
+        let own = solved.bvh.is_own();
+        let few = solved.scene.facets() / DRAWN_FACETS_PER_PIXEL <= camera.columns() * camera.rows();
+        let last = end as isize + isize::from(area);
+        let occluders = if own {
+            OccluderCache::new(lists, camera.is_parallel(), camera.pixel_area(), SUN_RAYS)
+        } else {
+            OccluderCache::none()
+        };
+        Ok(Painter {
+            solved,
+            camera,
+            centre_rows,
+            work,
+            pixel,
+            beside: false,
+            primary: Primary { items, draws: own && few, drawn: 0..0, last, line: None },
+            occluders: occluders.with_candidates(candidates),
+            tally: Tally::default(),
+        })
+    }
+
     /// What parallel rays have in common: their line, and what they see beside the object.
     #[inline(never)]
     fn look_beside(&mut self) {
@@ -332,25 +341,26 @@ impl<'a> Painter<'a, '_> {
             let index = |j: isize| (row - first) as usize * columns as usize + j as usize;
             let mut beside = false;
             for j in 0..columns {
-                let at = self.slot(row, j);
-                let [object, variance, tail] =
-                    [0, 1, 2].map(|i| self.centre_rows.at(at + self.stride - PIXEL_NOTES + i));
-                self.count_pixel(object > 0.0, variance, tail);
+                let at = self.centre_rows.place(row, j);
+                let centres = &self.centre_rows;
+                let (object, variance, tail) =
+                    (centres.is_object(at), centres.variance(at), centres.tail(at));
+                self.count_pixel(object, variance, tail);
                 if self.is_flat(at) && !beside {
                     self.write(target, index(j), at);
                     continue;
                 }
                 beside = self.settle(target, index(j), (row, j), goal);
                 let (mut more, mut back) = (beside, j - 1);
-                while more && back >= 0 && self.is_flat(self.slot(row, back)) {
+                while more && back >= 0 && self.is_flat(self.centre_rows.place(row, back)) {
                     more = self.settle(target, index(back), (row, back), goal);
                     back -= 1;
                 }
             }
             for j in 0..columns {
-                let at = self.slot(row, j);
+                let at = self.centre_rows.place(row, j);
                 if self.is_flat(at) {
-                    self.err(at, 0.2 * self.centre_rows.at(at + self.stride - 1));
+                    self.err(at, 0.2 * self.centre_rows.unevenness(at));
                 }
             }
         }
@@ -365,16 +375,16 @@ impl<'a> Painter<'a, '_> {
         (row, column): (isize, isize),
         goal: f64,
     ) -> bool {
-        let at = self.slot(row, column);
+        let at = self.centre_rows.place(row, column);
         let error = self.refine(target, index, row, column, goal);
         self.err(at, error);
         // flat no more
-        self.centre_rows.set(at + self.stride - 1, f64::INFINITY);
+        self.centre_rows.set_unevenness(at, f64::INFINITY);
         let bands = self.solved.shape.bands;
         let values = target.image.part(index * bands..(index + 1) * bands);
+        let terms = self.centre_rows.terms(at);
         self.solved.reference.iter().zip(values).enumerate().any(|(band, (reference, value))| {
-            let centre =
-                [0, 1, 2].map(|term| self.centre_rows.at(at + term * bands + band)).iter().sum::<f64>();
+            let centre = [0, 1, 2].map(|term| terms.at(term * bands + band)).iter().sum::<f64>();
             fabs(f64::from(*value) - f64::from(narrow(centre)))
                 > self.solved.settings.budget.flat_pixel * reference
         })
@@ -388,11 +398,11 @@ impl<'a> Painter<'a, '_> {
         let (mut object, mut uneven) = (0.0, 0.0);
         for j in 0..columns {
             let value = self.unevenness(row, j);
-            let end = self.slot(row, j) + self.stride;
-            self.centre_rows.set(end - 1, value);
-            if self.centre_rows.at(end - PIXEL_NOTES) > 0.0 {
+            let at = self.centre_rows.place(row, j);
+            self.centre_rows.set_unevenness(at, value);
+            if self.centre_rows.is_object(at) {
                 object += 1.0;
-                uneven += f64::from(u8::from(!self.is_flat(end - self.stride)));
+                uneven += f64::from(u8::from(!self.is_flat(at)));
             }
         }
         if uneven > 0.0 { (pixels * sqrt(object / uneven)).min(worst_pixel) } else { worst_pixel }
@@ -400,22 +410,15 @@ impl<'a> Painter<'a, '_> {
 
     /// Whether a pixel keeps its centre's value.
     fn is_flat(&self, at: usize) -> bool {
-        let end = at + self.stride;
-        let (sampled, uneven) = (self.centre_rows.at(end - 2), self.centre_rows.at(end - 1));
-        sampled == 0.0 && uneven <= self.solved.settings.budget.flat_pixel
+        let most = self.solved.settings.budget.flat_pixel;
+        !self.centre_rows.is_sampled(at) && self.centre_rows.unevenness(at) <= most
     }
 
     /// Counts the error of an object pixel's area sampling.
     fn err(&mut self, at: usize, error: f64) {
-        if self.centre_rows.at(at + self.stride - PIXEL_NOTES) > 0.0 {
+        if self.centre_rows.is_object(at) {
             self.tally.sampling2 += error * error;
         }
-    }
-
-    /// Where a pixel's centre stands in [`Painter::centre_rows`].
-    #[inline]
-    fn slot(&self, row: isize, column: isize) -> usize {
-        slot(row, column, self.width, self.stride)
     }
 
     /// Computes the centres of a row: `each` takes the terms ([`Painter::terms`]) of each range of pixels, of one pixel or of
@@ -507,22 +510,8 @@ impl<'a> Painter<'a, '_> {
 
     /// Stores the latest terms as those of the centres of pixels in [`Painter::centre_rows`].
     fn keep(&mut self, row: isize, pixels: Range<isize>, path: &Path) {
-        let bands = self.solved.shape.bands;
         let PixelScratch { terms, background, .. } = &*self.pixel;
-        let terms = if self.beside { background } else { terms };
-        let variance = path.variance + path.noise * path.noise;
-        let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
-        for column in pixels {
-            let at = slot(row, column, self.width, self.stride);
-            let slot = self.centre_rows.part_mut(at..at + self.stride);
-            copy(slot.part_mut(0..bands), &terms.diffuse);
-            copy(slot.part_mut(bands..2 * bands), &terms.mirror_sky);
-            copy(slot.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
-            copy(
-                slot.part_mut(3 * bands..3 * bands + PIXEL_NOTES),
-                &[object, variance, path.tail, sampled, 0.0],
-            );
-        }
+        self.centre_rows.store(row, pixels, if self.beside { background } else { terms }, path);
     }
 
     /// Counts an object pixel and its expected errors.
@@ -537,17 +526,15 @@ impl<'a> Painter<'a, '_> {
     /// Writes a pixel's centre.
     fn write(&self, target: &mut Target<'_>, index: usize, at: usize) {
         let bands = self.solved.shape.bands;
-        let slot = self.centre_rows.part(at..at + 3 * bands);
-        put(target, bands, index..index + 1, 1.0, |term, band| slot.at(term * bands + band));
+        let terms = self.centre_rows.terms(at);
+        put(target, bands, index..index + 1, 1.0, |term, band| terms.at(term * bands + band));
     }
 
     /// Largest difference between a pixel's centre and the mean of two opposite neighbours, relative to the reference
     /// radiance.
     fn unevenness(&self, row: isize, column: isize) -> f64 {
         let measure = self.measure();
-        let centre = |i: isize, j: isize| {
-            self.centre_rows.part(self.slot(row + i, column + j)..self.centre_rows.len())
-        };
+        let centre = |i: isize, j: isize| self.centre_rows.terms(self.centre_rows.place(row + i, column + j));
         let mut largest: f64 = 0.0;
         for (i, j) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
             let [before, here, after] = [centre(-i, -j), centre(0, 0), centre(i, j)];
@@ -592,11 +579,10 @@ impl<'a> Painter<'a, '_> {
         let measure = self.measure();
         let (mut along, mut down) = (0.0, 0.0);
         for i in -1..=1 {
-            let centre = |i: isize, j: isize| {
-                self.centre_rows.part(self.slot(row + i, column + j)..self.centre_rows.len())
-            };
+            let centre =
+                |i: isize, j: isize| self.centre_rows.terms(self.centre_rows.place(row + i, column + j));
             for j in -1..=1 {
-                sampled |= centre(i, j).at(self.stride - 2) > 0.0;
+                sampled |= self.centre_rows.is_sampled(self.centre_rows.place(row + i, column + j));
             }
             along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
             down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
@@ -635,13 +621,13 @@ impl<'a> Painter<'a, '_> {
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
         let goal = 0.7 * goal;
-        let parts = if solved.settings.budget.image < FINE_PIXELS { PIXEL_PARTS.1 } else { PIXEL_PARTS.0 };
+        let parts = if solved.settings.budget.image < FINE_PIXELS { PIXEL_PARTS_FINE } else { PIXEL_PARTS };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;
-            let mut places = [0.0; PIXEL_PARTS.1 + 1];
+            let mut places = [0.0; PIXEL_PARTS_FINE + 1];
             let places = evenly(&mut places, parts, shift);
-            let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { NARROWEST.1 };
+            let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { PLACES_NARROWEST };
             integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
                 // a ray on the very edge may see what lies beyond it
                 let [x, y] = [x, y].map(|x| clamp(x, PIXEL_MARGIN, 1.0 - PIXEL_MARGIN));
@@ -660,8 +646,8 @@ impl<'a> Painter<'a, '_> {
                 (!path.sampled).then_some(0.0)
             })
         };
-        let mut places = [0.0; PIXEL_PARTS.1 + 1];
-        let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: NARROWEST.0 };
+        let mut places = [0.0; PIXEL_PARTS_FINE + 1];
+        let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: LINES_NARROWEST };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
         let out = self.work.part(2 * line_integral::memory(stride)..self.work.len());
         put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
@@ -693,34 +679,13 @@ impl<'a> Painter<'a, '_> {
             };
             let ray = any(n);
             let hit = self.solved.bvh.closest_of(&mut ahead, n, goal, |m| if m == n { ray } else { any(m) });
-            self.pixel.terms.clear(bands);
-            let of = RaySample::Stratum { seed, index: n };
-            let PixelScratch { terms, work, .. } = &mut *self.pixel;
-            let path = self.solved.radiance_with((&ray, hit), of, terms, work, &mut self.occluders);
-            glare = glare.max(path.glare);
-            self.tally.primary += 1;
-            self.tally.chain += u64::from(path.rays);
-            let PixelScratch { terms, sums, squares, .. } = &mut *self.pixel;
-            sums.add(terms, bands);
-            for (band, square) in squares.iter_mut().enumerate().take(bands) {
-                *square += terms.sum(band) * terms.sum(band);
-            }
+            glare = glare.max(self.add_ray(&ray, hit, RaySample::Stratum { seed, index: n }));
             n += 1;
             if n == goal {
                 let share = 1.0 / f64::from(n);
-                let mut spread: f64 = 0.0;
-                for (band, (square, reference)) in squares.iter().zip(self.solved.reference).enumerate() {
-                    let mean = share * sums.sum(band);
-                    let variance = share * square - mean * mean;
-                    // below: rounding of equal rays
-                    if variance > 1e-12 * mean * mean {
-                        spread = spread.max(sqrt(variance) / reference);
-                    }
-                }
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
-                error =
-                    SCATTERED * spread.max(PIXEL_UNSEEN_SHARE * contrast * sqrt(share)) * pow(share, 0.75);
-                error = error.max(glare * share);
+                let spread = self.spread(share).max(PIXEL_UNSEEN_SHARE * contrast * sqrt(share));
+                error = (SCATTERED * spread * pow(share, 0.75)).max(glare * share);
                 if error > wanted && goal < SCATTER_RAYS_MOST {
                     goal *= 2;
                 }
@@ -733,22 +698,46 @@ impl<'a> Painter<'a, '_> {
         });
         error
     }
+
+    /// Adds one scattered ray to the sums of its pixel; returns its glare.
+    fn add_ray(&mut self, ray: &Ray, hit: Option<Hit>, sample: RaySample) -> f64 {
+        let bands = self.solved.shape.bands;
+        let PixelScratch { terms, work, sums, squares, .. } = &mut *self.pixel;
+        terms.clear(bands);
+        let path = self.solved.radiance_with((ray, hit), sample, terms, work, &mut self.occluders);
+        self.tally.primary += 1;
+        self.tally.chain += u64::from(path.rays);
+        sums.add(terms, bands);
+        for (band, square) in squares.iter_mut().enumerate().take(bands) {
+            *square += terms.sum(band) * terms.sum(band);
+        }
+        path.glare
+    }
+
+    /// Standard deviation of the scattered rays' radiance over the reference radiance, the largest of all bands; `share` is
+    /// that of one ray.
+    fn spread(&self, share: f64) -> f64 {
+        let mut spread: f64 = 0.0;
+        for (band, (square, reference)) in self.pixel.squares.iter().zip(self.solved.reference).enumerate() {
+            let mean = share * self.pixel.sums.sum(band);
+            let variance = share * square - mean * mean;
+            // below: rounding of equal rays
+            if variance > 1e-12 * mean * mean {
+                spread = spread.max(sqrt(variance) / reference);
+            }
+        }
+        spread
+    }
 }
 
 /// The ends of so many equal parts of the unit interval, those within it shifted.
 #[inline]
-fn evenly(places: &mut [f64; PIXEL_PARTS.1 + 1], parts: usize, shift: f64) -> &[f64] {
+fn evenly(places: &mut [f64; PIXEL_PARTS_FINE + 1], parts: usize, shift: f64) -> &[f64] {
     let places = places.head_mut(parts + 1);
     places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / parts as f64 + shift);
     places.set(0, 0.0);
     places.set(parts, 1.0);
     places
-}
-
-/// See [`Painter::slot`].
-#[inline]
-fn slot(row: isize, column: isize, width: usize, stride: usize) -> usize {
-    (row.rem_euclid(3) as usize * width + (column + 1) as usize) * stride
 }
 
 /// Writes the terms of pixels, `of` term and band, times `share`.

@@ -9,8 +9,11 @@ use crate::base::simd::WIDTH;
 use crate::base::sort::sort;
 use core::cmp::Ordering;
 
-/// Sine of the angle between facets of one plane, and the farthest that they lie from it (scene coordinates).
-const COPLANAR: (f64, f64) = (4e-6, 1e-7);
+/// Largest sine of the angle between facets of one plane.
+const COPLANAR_SINE: f64 = 4e-6;
+
+/// Largest distance of facets of one plane from it, in scene coordinates.
+const COPLANAR_DISTANCE: f64 = 1e-7;
 
 /// The most facets in one edge that are paired; where more meet, each has the edge for itself.
 const MOST_PAIRED: usize = 16;
@@ -188,9 +191,9 @@ fn coplanar(corners: &[[Vec3; 3]], of: u32, facet: u32) -> bool {
     let (normal, distance) = plane(&corners.at(of as usize));
     let (own, _) = plane(&corners.at(facet as usize));
     let cross = normal.cross(own);
-    let near = |c: &Vec3| (product(normal, *c) - distance).abs() <= COPLANAR.1;
+    let near = |c: &Vec3| (product(normal, *c) - distance).abs() <= COPLANAR_DISTANCE;
     normal.dot(own) > 0.0
-        && cross.dot(cross) <= COPLANAR.0 * COPLANAR.0
+        && cross.dot(cross) <= COPLANAR_SINE * COPLANAR_SINE
         && corners.at(facet as usize).iter().all(near)
 }
 

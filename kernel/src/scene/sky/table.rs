@@ -24,10 +24,13 @@ pub(super) struct Table<'a> {
 /// about it.
 #[derive(Clone, Copy, Debug)]
 struct Spot {
-    /// First row, and rows.
-    rows: (usize, usize),
-    /// First column, wrapped, and columns.
-    columns: (usize, usize),
+    first_row: usize,
+    /// Number of rows.
+    rows: usize,
+    /// Wrapped.
+    first_column: usize,
+    /// Number of columns.
+    columns: usize,
     /// Where the brightest sample begins.
     peak: usize,
     /// Share of its spectrum that is left.
@@ -141,8 +144,8 @@ impl<'a> Table<'a> {
 
     /// The part of the brightest sample's spectrum that was taken out at a row and a column.
     fn taken(&self, spot: &Spot, row: usize, column: usize) -> f64 {
-        let across = (column + self.columns - spot.columns.0) % self.columns.max(1);
-        if !(spot.rows.0..spot.rows.0 + spot.rows.1).contains(&row) || across >= spot.columns.1 {
+        let across = (column + self.columns - spot.first_column) % self.columns.max(1);
+        if !(spot.first_row..spot.first_row + spot.rows).contains(&row) || across >= spot.columns {
             return 0.0;
         }
         let peak = self.samples.get(spot.peak..spot.peak + self.bands).unwrap_or(&[]);
@@ -195,7 +198,14 @@ impl<'a> Table<'a> {
         if base * BRIGHT > 1.0 {
             return None;
         }
-        let spot = Spot { rows: (top, bottom + 1 - top), columns: (left, 2 * aside + 1), peak, base };
+        let spot = Spot {
+            first_row: top,
+            rows: bottom + 1 - top,
+            first_column: left,
+            columns: 2 * aside + 1,
+            peak,
+            base,
+        };
         let (mut energy, mut middle, mut square) = (0.0, Vec3::ZERO, 0.0);
         for pass in 0..2 {
             let axis = unit(middle).unwrap_or(Vec3::Z);

@@ -64,9 +64,8 @@ impl Solved<'_> {
         far: f64,
         known: &mut DetailCache,
     ) -> bool {
-        let (area, per_square) = self.settings.pixel;
         let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
-        let pixel = area + per_square * far * far;
+        let pixel = self.settings.pixel.at(far);
         let near = |many: bool| Near { normal: surface.normal, size: sqrt(element), many };
         GATHERS
             && element > DETAIL_PIXELS_LEAST * pixel

@@ -30,9 +30,11 @@ pub(super) const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
 /// nineteen of twenty: a few may carry it. Estimates of images count it in.
 pub(crate) const CAUTION: f64 = 1.9;
 
-/// Fewest rays from a point: where they find reflected light alone, and where they find the sky, too, of which fewer may all
-/// miss what little is bright.
-pub(super) const GATHER_RAYS_FEWEST: (f64, f64) = (32.0, 128.0);
+/// Fewest rays from a point whose straight sky is known: they find reflected light alone.
+pub(super) const GATHER_RAYS_FEWEST: f64 = 32.0;
+
+/// Fewest rays from a point that find the sky, too: fewer may all miss a small bright part of it.
+const GATHER_SKY_RAYS_FEWEST: f64 = 128.0;
 
 /// Most rays from a point.
 const GATHER_RAYS_MOST: f64 = 65536.0;
@@ -197,20 +199,23 @@ pub(super) fn usual_rays(tolerance: f64) -> f64 {
     pow(0.8 / tolerance, 4.0 / 3.0)
 }
 
-/// Least and most standard deviation of a ray over that where half of a hemisphere is bright.
-const RAY_SPREAD: (f64, f64) = (1e-3, 1.0);
+/// Least standard deviation of a ray that is expected, over that where half of a hemisphere is bright.
+const RAY_SPREAD_LEAST: f64 = 1e-3;
+
+/// Largest standard deviation of a ray that is expected, over that where half of a hemisphere is bright.
+const RAY_SPREAD_MOST: f64 = 1.0;
 
 /// Standard deviation of what is met where the sun shines over that under the sky alone: places in its light are few and
 /// bright.
 const SUNLIT: f64 = 2.5;
 
-/// Least standard deviation of what is met over its mean, on the scale of [`RAY_SPREAD`].
+/// Least standard deviation of what is met over its mean, on the scale of [`RAY_SPREAD_MOST`].
 const LEAST_VARIED: f64 = 0.3;
 
 /// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is met: of
 /// three tenths of the hemisphere.
 pub(super) fn spread(reflected: f64) -> f64 {
-    clamp(3.0 * reflected, RAY_SPREAD.0, RAY_SPREAD.1)
+    clamp(3.0 * reflected, RAY_SPREAD_LEAST, RAY_SPREAD_MOST)
 }
 
 /// Where a ray from a point goes on diffusely.
@@ -317,7 +322,7 @@ impl Solved<'_> {
         let axes = frame(gather_point.surface.normal);
         let tolerance = self.settings.budget.image / gather_point.weight;
         let goal = (GOAL * tolerance) * (GOAL * tolerance);
-        let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST.0 } else { GATHER_RAYS_FEWEST.1 };
+        let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST } else { GATHER_SKY_RAYS_FEWEST };
         let least = clamp(
             GATHER_RAYS_FACTOR_LEAST * usual_rays(tolerance / self.spread_at(gather_point)),
             fewest,
@@ -352,7 +357,7 @@ impl Solved<'_> {
     /// Standard deviation of a ray from a point over that where half of a hemisphere is bright: where the straight sky is
     /// known, of what is met, which the element tells about, whether it is met or not.
     fn spread_at(&self, gather_point: &GatherPoint<'_>) -> f64 {
-        let Some(open) = gather_point.open else { return RAY_SPREAD.1 };
+        let Some(open) = gather_point.open else { return RAY_SPREAD_MOST };
         let (bands, blocked) = (self.shape.bands, (1.0 - open.share).max(f64::MIN_POSITIVE));
         let of = |(band, reference): (usize, &f64)| {
             let met = held(gather_point.values, bands, gather_point.local, gather_point.open, band)
@@ -362,7 +367,7 @@ impl Solved<'_> {
         let met = self.reference.iter().enumerate().map(of).fold(0.0, f64::max);
         let met = if self.light.sun.is_some() { SUNLIT * met } else { met };
         let chance = 2.0 * sqrt(blocked * open.share.max(0.0));
-        clamp(met * chance.max(LEAST_VARIED * blocked), RAY_SPREAD.0, RAY_SPREAD.1)
+        clamp(met * chance.max(LEAST_VARIED * blocked), RAY_SPREAD_LEAST, RAY_SPREAD_MOST)
     }
 
     /// One more ray from a point.

@@ -104,9 +104,11 @@ pub struct OccluderCache<'m> {
     pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
     parallel: bool,
-    /// Facets seen smaller than this are not worth a look along the mirror direction, and toward the sun: their few rays
+    /// Least projected area of a facet whose occluders along the mirror direction are collected: the few rays of smaller ones
     /// cost less.
-    least: (f64, f64),
+    least_mirror: f64,
+    /// Least area of a facet whose occluders toward the sun are collected.
+    least_sun: f64,
 }
 
 /// Rays that cost as much as a look.
@@ -123,13 +125,27 @@ impl<'m> OccluderCache<'m> {
         let all = [Image::default(); IMAGES];
         let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
         let images = (IMAGES > 0).then_some(images);
-        OccluderCache { lists, images, parallel, least: (least, least / sun), ..OccluderCache::none() }
+        OccluderCache {
+            lists,
+            images,
+            parallel,
+            least_mirror: least,
+            least_sun: least / sun,
+            ..OccluderCache::none()
+        }
     }
 
     /// A cache that holds nothing: every ray is traced.
     pub fn none() -> OccluderCache<'m> {
         let candidates = Candidates::none();
-        OccluderCache { lists: &mut [], images: None, candidates, parallel: false, least: (0.0, 0.0) }
+        OccluderCache {
+            lists: &mut [],
+            images: None,
+            candidates,
+            parallel: false,
+            least_mirror: 0.0,
+            least_sun: 0.0,
+        }
     }
 
     /// The same with room for outlines.
@@ -144,8 +160,9 @@ impl<'m> OccluderCache<'m> {
 
     /// The images of the sun that may be seen from a point of a surface.
     pub(super) fn images<'a>(&mut self, solved: &Solved<'a>, surface: &Surface, spread: f64) -> Walk<'a> {
-        let side = (solved.elements.facet_sides(), surface.facet * solved.scene.sides() + surface.side);
-        let near = |reach: f64| solved.images.near(side, surface.point, reach, spread);
+        let sides = solved.elements.facet_sides();
+        let side = surface.facet * solved.scene.sides() + surface.side;
+        let near = |reach: f64| solved.images.near(sides, side, surface.point, reach, spread);
         let Some(images) = &mut self.images else { return Walk::All(near(0.0)) };
         let apart = surface.point - images.centre;
         let here = Some((surface.facet, surface.side));
@@ -176,8 +193,8 @@ impl<'m> OccluderCache<'m> {
     ) -> Option<&[u32]> {
         let area = solved.scene.areas().at(surface.facet);
         let small = match kind {
-            RayKind::Mirror => area * surface.normal.dot(direction) < self.least.0,
-            _ => area < self.least.1,
+            RayKind::Mirror => area * surface.normal.dot(direction) < self.least_mirror,
+            _ => area < self.least_sun,
         };
         if small {
             return None;

@@ -12,9 +12,12 @@ use crate::scene::MAX_BANDS;
 use crate::scene::lobe::{Highlight, Lobe};
 use crate::scene::sun::Sun;
 
-/// Most rays toward the sun's disc of a ray that stands for itself, and of one that only glances: where all of them
-/// agree, these are enough.
-const DISC_RAYS: (u32, u32) = (16, 4);
+/// Most rays toward the sun's disc, in a first set, of a ray that integrates ([`RaySample::Integrate`]): where all of them
+/// agree, they are enough.
+const DISC_RAYS: u32 = 16;
+
+/// The same of a ray that probes ([`RaySample::Probe`]).
+const DISC_RAYS_PROBING: u32 = 4;
 
 /// So many of them that what is at stake is wrong by a part of the tolerance: half of it by n^-3/4, at the middle of a
 /// penumbra, is to be this part.
@@ -92,10 +95,10 @@ impl Solved<'_> {
         let (sequence, coordinate, mut count, mut goal) = match sample {
             RaySample::Stratum { seed, index } => (Sequence::new(seed), 2, index, index + 1),
             RaySample::Integrate(seed) => {
-                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.0))
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS))
             }
             RaySample::Probe(seed) => {
-                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS.1))
+                (Sequence::new(hash2(seed, 0x0d15_c000)), 0, 0, self.disc_rays(at_stake, DISC_RAYS_PROBING))
             }
         };
         let (mut lit, mut all) = (0.0, 0.0);
@@ -294,7 +297,7 @@ impl Solved<'_> {
                 seen
             });
             self.add_highlight(state, (sun, value, all), terms);
-            self.glare(state, lobe, (value, at_stake), path);
+            self.glare(state, lobe, value, at_stake, path);
         }
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
         let mut images = mode.occluders.images(self, surface, sun.half_angle());
@@ -320,13 +323,13 @@ impl Solved<'_> {
                 seen
             });
             self.add_highlight(state, (sun, value, all), terms);
-            self.glare(state, lobe, (value, at_stake), path);
+            self.glare(state, lobe, value, at_stake, path);
         }
     }
 
     /// Notes a highlight that other rays of a lobe may meet nearer to its middle. Directions in which it is brighter than
     /// some value are as many as the inverse of that, so that the brightest of n rays tells what the rest of it brings.
-    fn glare(&self, state: &PathState<'_>, lobe: &Lobe, (value, brought): (f64, f64), path: &mut Path) {
+    fn glare(&self, state: &PathState<'_>, lobe: &Lobe, value: f64, brought: f64, path: &mut Path) {
         if state.lobes > 0
             && value > 0.0
             && state.images[0].head(self.shape.bands).iter().any(|lit| *lit > 0.0)

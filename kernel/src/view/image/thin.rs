@@ -1,7 +1,7 @@
 //! Sheets and wires seen edge on, which stand between pixel centres: found in the mesh, as no centre shows them.
 
-use super::{PIXEL_NOTES, Painter};
-use crate::base::index::{Index, IndexMut};
+use super::Painter;
+use crate::base::index::Index;
 use crate::base::math::{Vec3, unit};
 use crate::rays::bvh::HalfSpace;
 use core::ops::Range;
@@ -12,7 +12,7 @@ impl Painter<'_, '_> {
     #[inline(never)]
     pub(super) fn find_thin(&mut self, row: isize, columns: isize) {
         let empty = |this: &Self, j: isize| {
-            let at = this.slot(row, j);
+            let at = this.centre_rows.place(row, j);
             this.is_dark(at) && this.is_flat(at)
         };
         let mut start = 0;
@@ -27,8 +27,8 @@ impl Painter<'_, '_> {
                 // halved until nothing is in it, or it is one pixel
                 while !run.is_empty() && self.reaches(row, &run) {
                     if run.len() == 1 {
-                        let at = self.slot(row, run.start) + self.stride - 1;
-                        self.centre_rows.set(at, f64::INFINITY);
+                        let at = self.centre_rows.place(row, run.start);
+                        self.centre_rows.set_unevenness(at, f64::INFINITY);
                         break;
                     }
                     run.end = run.start + run.len() as isize / 2;
@@ -41,15 +41,14 @@ impl Painter<'_, '_> {
 
     /// Whether fronts of facets may reach into a pixel whose centre shows none.
     pub(super) fn is_thin(&self, row: isize, column: isize) -> bool {
-        let end = self.slot(row, column) + self.stride;
-        let empty = self.is_dark(end - self.stride);
-        self.centre_rows.at(end - 1) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
+        let at = self.centre_rows.place(row, column);
+        let empty = self.is_dark(at);
+        self.centre_rows.unevenness(at) == f64::INFINITY || empty && self.reaches(row, &(column..column + 1))
     }
 
     /// Whether a pixel's centre shows no facet, or a black back.
     fn is_dark(&self, at: usize) -> bool {
-        let terms = self.centre_rows.part(at..at + 3 * self.solved.shape.bands);
-        self.centre_rows.at(at + self.stride - PIXEL_NOTES) == 0.0 || terms.iter().all(|l| *l == 0.0)
+        !self.centre_rows.is_object(at) || self.centre_rows.terms(at).iter().all(|l| *l == 0.0)
     }
 
     /// Whether the front of a facet may reach into some pixels of a row.

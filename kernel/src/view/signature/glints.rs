@@ -31,8 +31,11 @@ const BEND: f64 = 0.004;
 /// A part may show so many times the disc.
 const GLINT_WIDTH_FACTOR: f64 = 1.5;
 
-/// Lines across a part, and where rays from them disagree.
-const GLINT_LINES: (u32, u32) = (64, 1024);
+/// Lines across a part of a facet.
+const GLINT_LINES: u32 = 64;
+
+/// Lines across a part where rays from the first [`GLINT_LINES`] disagree.
+const GLINT_LINES_MOST: u32 = 1024;
 
 /// Sums over parts of a lobe: those whose angle is less than this share of that to the disc are small.
 const LOBE_PART_ANGLE_MOST: f64 = 0.3;
@@ -213,7 +216,7 @@ impl Glints<'_, '_> {
     ) {
         let bands = self.solved.shape.bands;
         let sequence = Sequence::new(hash2(seen.facet as u32, part.depth));
-        let mut lines = GLINT_LINES.0;
+        let mut lines = GLINT_LINES;
         loop {
             let (mut all, mut lit) = (0.0, 0.0);
             self.products[1].head_mut(bands).fill(0.0);
@@ -234,7 +237,7 @@ impl Glints<'_, '_> {
                 }
             }
             let partly = lit > 0.0 && lit < all;
-            if partly && lines < GLINT_LINES.1 {
+            if partly && lines < GLINT_LINES_MOST {
                 lines *= 4;
                 continue;
             }
@@ -261,18 +264,11 @@ impl Glints<'_, '_> {
             let most = lobe.value(1.0 - 0.5 * nearest * nearest);
             Some(reach > LOBE_PART_ANGLE_MOST * (off + width) && brings(most, part) > faint)
         };
-        self.parts(halves, |this, part| this.points(seen, lobe, part, (scale, faint), sums));
+        self.parts(halves, |this, part| this.points(seen, lobe, part, scale, faint, sums));
     }
 
     /// Adds what a small part shows of the sun in a lobe, by points of it.
-    fn points(
-        &mut self,
-        seen: &Seen<'_>,
-        lobe: &Lobe,
-        part: &Part,
-        (scale, faint): (f64, f64),
-        sums: &mut Sums,
-    ) {
+    fn points(&mut self, seen: &Seen<'_>, lobe: &Lobe, part: &Part, scale: f64, faint: f64, sums: &mut Sums) {
         let bands = self.solved.shape.bands;
         let sequence = Sequence::new(hash2(seen.facet as u32, 0x5000 + part.depth));
         let (mut all, mut lit, mut count, mut goal) = (0.0, 0.0, 0u32, 1);
