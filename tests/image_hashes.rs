@@ -6,6 +6,7 @@
 mod case;
 #[path = "support/plane_kernel.rs"]
 mod plane_kernel;
+#[allow(dead_code)]
 #[path = "support/plane_reference/mod.rs"]
 mod plane_reference;
 #[path = "support/stages.rs"]
