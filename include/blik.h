@@ -918,7 +918,7 @@ typedef struct blik_tally {
     uint64_t refined_pixels;
     /* Sum over object pixels of the squared expected error from the diffuse solution. */
     double noise_squared;
-    /* The same of the error from sampling the pixel's area. */
+    /* Sum over object pixels of the squared expected error from sampling the pixel's area. */
     double sampling_squared;
     /* Largest bound on what cut chains could still have brought. */
     double chain_tail;
@@ -956,7 +956,7 @@ BLIK_API blik_status blik_image_scratch_size(const blik_solution *solution, cons
  *   scratch_size     its bytes
  *   error            receives what is wrong where the call is refused; null: not wanted
  *   pixels           receives radiance by row, column and band: rows x columns x bands values
- *   pixel_count      number of values that there is room for: exactly so many
+ *   pixel_count      number of values that pixels has room for: rows x columns x bands
  *   components       receives the three terms of the radiance one after the other, each like pixels: diffuse, mirrored
  *                    sky and sun, mirrored diffuse. Null: not wanted
  *   component_count  number of values that there is room for: three times pixel_count
@@ -976,7 +976,7 @@ BLIK_API blik_status blik_image(const blik_solution *solution, const blik_camera
  *   scratch_size     its bytes
  *   error            receives what is wrong where the call is refused; null: not wanted
  *   pixels           receives radiance by row, column and band: rows x columns x bands values
- *   pixel_count      number of values that there is room for: exactly so many
+ *   pixel_count      number of values that pixels has room for: rows x columns x bands
  *   components       receives the three terms of the radiance one after the other, each like pixels: diffuse, mirrored
  *                    sky and sun, mirrored diffuse. Null: not wanted
  *   component_count  number of values that there is room for: three times pixel_count

@@ -1,4 +1,5 @@
-//! Constants of the kernel and the C library: no name stands twice, and each says in a comment what it is.
+//! Constants of the kernel and the C library: no name stands twice, and each says in a comment what it is. Comments call
+//! things by their names.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -74,24 +75,48 @@ fn faults<'a>(sources: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<String> 
     faults
 }
 
-#[test]
-fn no_name_stands_twice_and_each_has_a_comment() {
+/// Words in place of a number or a name, with which a comment cannot be read by itself.
+const VAGUE: [&str; 3] = ["so many", "so much", "the same of"];
+
+/// The lines of comments that hold one of [`VAGUE`].
+fn vague(source: &str) -> Vec<(usize, &str)> {
+    let comments =
+        source.lines().enumerate().filter_map(|(number, line)| Some((number + 1, line.split_once("//")?.1)));
+    let is_vague = |comment: &str| VAGUE.iter().any(|words| comment.to_lowercase().contains(words));
+    comments.filter(|(_, comment)| is_vague(comment)).collect()
+}
+
+/// The sources of the kernel and the C library, by name and text.
+fn sources() -> Vec<(String, String)> {
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
     let root = above.map(Path::to_path_buf).find(|p| p.join("kernel/src").is_dir()).unwrap();
     let mut all = Vec::new();
     files(&root.join("kernel/src"), &mut all);
     files(&root.join("ffi/src"), &mut all);
     all.sort();
-    let sources: Vec<(String, String)> = all
-        .iter()
-        .map(|path| {
-            (path.strip_prefix(&root).unwrap().display().to_string(), fs::read_to_string(path).unwrap())
-        })
-        .collect();
+    let read = |path: &PathBuf| {
+        (path.strip_prefix(&root).unwrap().display().to_string(), fs::read_to_string(path).unwrap())
+    };
+    all.iter().map(read).collect()
+}
+
+#[test]
+fn no_name_stands_twice_and_each_has_a_comment() {
+    let sources = sources();
     let count: usize = sources.iter().map(|(_, source)| constants(source).len()).sum();
-    assert!(count > 350, "{count} constants in {} files", all.len());
+    assert!(count > 350, "{count} constants in {} files", sources.len());
     let faults = faults(sources.iter().map(|(file, source)| (file.as_str(), source.as_str())));
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn comments_name_what_they_speak_of() {
+    let mut faults = Vec::new();
+    for (file, source) in &sources() {
+        faults.extend(vague(source).into_iter().map(|(line, comment)| format!("{file}:{line}:{comment}")));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert_eq!(vague("let so_many = 1; // so many\n// rays\n").len(), 1);
 }
 
 #[test]

@@ -29,7 +29,7 @@ impl Lines {
     }
 
     fn bytes(&mut self, size: usize) -> &mut [u8] {
-        // SAFETY: so many bytes there are.
+        // SAFETY: there are as many bytes.
         unsafe { std::slice::from_raw_parts_mut(self.at(), size) }
     }
 }
@@ -278,7 +278,7 @@ fn loaded<R>(
     let (mut scene, mut coupling, mut solution) = (null_mut(), null_mut(), null_mut());
     let mut bytes = 0;
     let at = block.at().cast::<c_void>();
-    // SAFETY: the block has so many bytes, and outlives the handles.
+    // SAFETY: the block has its length in bytes, and outlives the handles.
     unsafe {
         let status = blik_load_size(at, size, null_mut(), &mut bytes);
         if refused(status) {

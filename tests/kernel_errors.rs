@@ -323,7 +323,7 @@ fn memory_of_the_wrong_size() {
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     assert!(matches!(Block::open(&[]).unwrap_err(), Error::BufferTooSmall { given: 0, .. }));
-    // as many elements as an index holds, the finest cut of so many facets goes beyond
+    // as many elements as an index holds, the finest subdivision of these facets goes beyond
     let error = SubdivisionTree::bytes(1 << 29, 1e-6).unwrap_err();
     is(error, Error::TooMany { what: "elements", limit: 1 << 29 }, &["too many elements", "536870912"]);
     // more pieces of a polygon than there is room for

@@ -7,7 +7,7 @@ mod render;
 use render::{Folder, SCENE, read_npy};
 use serde_json::Value;
 
-/// The plate with a mirror beside it, in so many bands, under a sky that is brighter in each.
+/// The plate with a mirror beside it, in a number of bands, under a sky that is brighter in each.
 fn scene(bands: usize) -> Folder {
     let each = |f: &dyn Fn(usize) -> f64| format!("{:?}", (0..bands).map(f).collect::<Vec<_>>());
     let keys = format!(

@@ -28,7 +28,7 @@ fn quads() -> usize {
     if quick() { 5 } else { 16 }
 }
 
-/// Adds up the seconds that `run` reports, over so many runs.
+/// Adds up the seconds that `run` reports, over all runs.
 fn reported(runs: u64, mut run: impl FnMut() -> f64) -> Duration {
     Duration::from_secs_f64((0..runs).map(|_| run()).sum())
 }

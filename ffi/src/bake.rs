@@ -107,7 +107,7 @@ fn aligned(memory: &[u8]) -> Result<(), blik_error> {
     }
 }
 
-/// Bytes for the handles of a block with so many parts.
+/// Bytes for the handles of a block of `blocks` parts.
 fn load_bytes(blocks: usize) -> usize {
     let handles = head::<blik_scene>() + head::<blik_coupling>() + head::<blik_solution>();
     blocks.saturating_mul(size_of::<Block<'_>>()).saturating_add(handles + 2 * ALIGNMENT)

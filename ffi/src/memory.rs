@@ -104,7 +104,7 @@ pub(crate) unsafe fn output_of<'a, T>(
     unsafe { output(at, count) }.map_err(|error| error.field(field))
 }
 
-/// The same where a null pointer stands for an array that nobody wants: none of it.
+/// As [`output`], for an array that the caller may leave out: empty for a null pointer.
 ///
 /// # Safety
 /// As for [`output`].

@@ -87,7 +87,7 @@ impl Reader {
     /// Number `at` of entry `index`.
     fn number<T: Copy>(array: &blik_array, index: usize, at: usize) -> T {
         let entry = array.data.cast::<u8>().wrapping_add(index.wrapping_mul(array.stride));
-        // SAFETY: the kernel asks for indices below `count`, and `check` saw that an entry holds so many numbers.
+        // SAFETY: the kernel asks for indices below `count`, and `check` saw that an entry holds as many numbers.
         unsafe { entry.cast::<T>().add(at).read_unaligned() }
     }
 

@@ -50,7 +50,8 @@ impl Lanes {
         Ok(Lanes { start: Start(memory.as_mut_ptr()), size, count })
     }
 
-    /// Calls `work` with ranges that cover all `rows` and scratch memory for a scene with so many cuts.
+    /// Calls `work` with ranges that cover all `rows` and scratch memory for a scene whose spans have up to `cuts`
+    /// cuts.
     fn rows(
         &self,
         rows: usize,
@@ -72,7 +73,7 @@ impl Lanes {
 /// The part of an array that belongs to a range of rows of `stride` values each.
 ///
 /// # Safety
-/// The array has so many rows, and nobody else uses these.
+/// The array has the rows of `range`, and nobody else uses these.
 unsafe fn part<'a, T>(start: &Start<T>, range: &Range<usize>, stride: usize) -> &'a mut [T] {
     let count = range.end.saturating_sub(range.start);
     // SAFETY: by the caller's promise.

@@ -307,7 +307,7 @@ impl<T: Sized_> Place<T> {
         Ok(Place { at: NonNull::new(at).ok_or(blik_error::of(BLIK_ERROR_NULL))?, size })
     }
 
-    /// The same where `at` may be null: nobody wants it.
+    /// As [`Place::new`], for an output that the caller may leave out: `None` for a null pointer.
     ///
     /// # Safety
     /// As for `new`.
@@ -319,7 +319,7 @@ impl<T: Sized_> Place<T> {
     /// Writes what the caller's header has of it.
     pub fn write(self, mut value: T) {
         *value.size_mut() = self.size;
-        // SAFETY: by the promise of `new` there are so many bytes, no more than a T has.
+        // SAFETY: by the promise of `new` there are `size` bytes, no more than a T has.
         unsafe {
             let from = (&raw const value).cast::<u8>();
             core::ptr::copy_nonoverlapping(from, self.at.as_ptr().cast::<u8>(), self.size);

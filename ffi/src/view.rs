@@ -35,7 +35,7 @@ pub struct blik_tally {
     pub refined_pixels: u64,
     /// Sum over object pixels of the squared expected error from the diffuse solution.
     pub noise_squared: f64,
-    /// The same of the error from sampling the pixel's area.
+    /// Sum over object pixels of the squared expected error from sampling the pixel's area.
     pub sampling_squared: f64,
     /// Largest bound on what cut chains could still have brought.
     pub chain_tail: f64,
@@ -216,7 +216,7 @@ impl Out<'_> {
 /// - `solution`: the solution
 /// - `camera`: the camera
 /// - `pixels`: receives radiance by row, column and band: rows x columns x bands values
-/// - `pixel_count`: number of values that there is room for: exactly so many
+/// - `pixel_count`: number of values that `pixels` has room for: rows x columns x bands
 /// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
 ///   and sun, mirrored diffuse. Null: not wanted
 /// - `component_count`: number of values that there is room for: three times `pixel_count`
@@ -322,7 +322,7 @@ fn paint(
 /// - `first`: index of the first row
 /// - `rows`: number of rows
 /// - `pixels`: receives radiance by row, column and band: `rows` x columns x bands values
-/// - `pixel_count`: number of values that there is room for: exactly so many
+/// - `pixel_count`: number of values that `pixels` has room for: `rows` x columns x bands
 /// - `components`: receives the three terms of the radiance one after the other, each like `pixels`: diffuse, mirrored sky
 ///   and sun, mirrored diffuse. Null: not wanted
 /// - `component_count`: number of values that there is room for: three times `pixel_count`

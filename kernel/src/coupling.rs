@@ -177,7 +177,7 @@ impl Record {
         }
     }
 
-    /// The same with `share` of the weight.
+    /// The record with `share` of its weight.
     pub fn scaled_beam(self, share: f64) -> Record {
         let scaled = |x: f32| (share * f64::from(x)) as f32;
         let [square, count] = self.moment;
@@ -340,7 +340,7 @@ impl<'m> RowView<'m> {
         simd::run(Isa::detect(), Gather { row: self, values, sums });
     }
 
-    /// The same of ones: sum over the targets of their shares.
+    /// Sums over the targets of their shares, one per band: [`RowView::gather`] of ones.
     pub fn sums(&self, sums: &mut [f64]) {
         sums.fill(0.0);
         for record in self.targets {

@@ -93,7 +93,7 @@ impl Settings {
     }
 }
 
-/// The most bytes of a lane's beams: a facet's rays, all of which meet other elements, need less by far.
+/// Most bytes of a lane's beams: a facet's rays, all of which meet other elements, need less by far.
 const MOST_BEAM_BYTES: usize = 1 << 34;
 
 /// Share of the pieces of an image that a finer round computes first, as its inverse: they tell whether the rest is worth
@@ -205,7 +205,7 @@ pub struct Image {
 }
 
 impl Host {
-    /// A pool of so many threads; 0: as many as there are cores.
+    /// A pool of `threads` threads; 0: as many as there are cores.
     ///
     /// # Errors
     /// [`Error::TooMany`] where the system gives no threads.

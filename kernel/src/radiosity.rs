@@ -286,7 +286,7 @@ impl System<'_> {
         }
     }
 
-    /// The same of the straight sky, in its table.
+    /// As [`System::fill_absent_rows`], in the table of the straight sky.
     pub fn fill_absent_straight(&self, values: &mut [f64], variance: &mut [f32]) {
         let stride = straight::stride(self.shape.bands);
         if values.is_empty() {

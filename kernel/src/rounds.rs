@@ -5,7 +5,7 @@ use crate::settings::check_tolerance;
 use crate::view::chain::GATHERS;
 
 /// Most rounds of one image.
-const ROUNDS: u32 = 3;
+const ROUNDS_MOST: u32 = 3;
 
 /// Least ratio of a round's tolerance to the one before: half the tolerance takes some four times as long.
 const ROUND_STEP_LEAST: f64 = 0.3;
@@ -15,7 +15,7 @@ const ROUND_STEP_MOST: f64 = 0.7;
 
 /// Ratio of a round's error estimate to the one before above which no other round follows, once the solution is as fine as
 /// asked: the next would gain as little.
-const IDLE: f64 = 0.8;
+const ROUND_GAIN_IDLE: f64 = 0.8;
 
 /// Most rays that another round may be expected to take.
 const ROUND_RAYS_MOST: f64 = 2e8;
@@ -23,24 +23,27 @@ const ROUND_RAYS_MOST: f64 = 2e8;
 /// Most bytes of coupling that another round may be expected to take.
 const ROUND_BYTES_MOST: f64 = (2u64 << 30) as f64;
 
-/// Tolerance of an image's first solution over that of the image: rays from the image's points find the rest, and light that
-/// is reflected once more counts with the reflectance, from many elements whose errors differ.
+/// Tolerance of an image's first solution over that of the image. Final gathering finds the rest, and reflected light
+/// counts with the reflectance, from many elements whose errors differ. Measured by `cargo run --release --example
+/// calibrate`.
 const FIRST_ROUND_FACTOR: f64 = 3.0;
 
-/// The most of it: coarser elements tell nothing.
-const COARSEST: f64 = 0.02;
+/// Largest tolerance of a first solution: coarser elements tell nothing.
+const FIRST_TOLERANCE_MOST: f64 = 0.02;
 
-/// An image's tolerance below which its first solution's goes with its power of 3/4 alone: rays of rows go with the power
-/// -1.5 of theirs and more elements have them, rays from points with the power -1.3 of the image's.
+/// Tolerance of an image below which that of its first solution goes with its power of 3/4 alone. Rays of rows go with
+/// the power -1.5 of theirs, and more elements have them; rays from points go with the power -1.3 of the image's.
 const FINE_IMAGE: f64 = 2e-3;
 
-/// Estimates of a part of an image are worse than of all by less than this factor.
+/// Largest factor by which the estimate of a part of an image exceeds that of all.
 const REGION_FACTOR: f64 = 1.15;
 
 /// The tolerance of the solution of an image's first round.
 pub fn first_tolerance(asked: f64) -> f64 {
     if GATHERS {
-        asked.max(COARSEST.min(FIRST_ROUND_FACTOR * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)))
+        asked.max(
+            FIRST_TOLERANCE_MOST.min(FIRST_ROUND_FACTOR * asked * sqrt(sqrt(FINE_IMAGE / asked)).max(1.0)),
+        )
     } else {
         asked
     }
@@ -65,8 +68,8 @@ pub struct Round {
 /// the one `before` it; `None` where the image is good enough, would hardly be better, or would take too much.
 pub fn next_tolerance(asked: f64, last: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     let coarse = last.tolerance > asked;
-    let idle = !coarse && before.is_some_and(|before| last.estimate > IDLE * before.estimate);
-    let done = last.estimate <= asked || rounds >= ROUNDS || !last.by_visibility || idle;
+    let idle = !coarse && before.is_some_and(|before| last.estimate > ROUND_GAIN_IDLE * before.estimate);
+    let done = last.estimate <= asked || rounds >= ROUNDS_MOST || !last.by_visibility || idle;
     let most = (last.rays as f64 / ROUND_RAYS_MOST).max(last.bytes as f64 / ROUND_BYTES_MOST);
     let least = ROUND_STEP_LEAST.min(asked / last.tolerance).max(sqrt(most));
     // no ray was traced, as every row is in closed form: finer ones are as cheap

@@ -52,7 +52,7 @@ impl Settings {
         RowSettings::new(scene, &self.budget, self.max_bounces, self.directional, self.all_irradiances)
     }
 
-    /// As [`Settings::rows`], for so many rows within the budget of rays.
+    /// As [`Settings::rows`], for `count` rows within the budget of rays.
     pub fn rows_within(&self, scene: &Scene<'_>, count: usize) -> RowSettings {
         let rows = self.rows(scene);
         self.ray_budget.map_or(rows, |budget| rows.within(count, budget))
@@ -75,12 +75,14 @@ impl Settings {
     }
 }
 
-/// Rays of a round whose tolerance is half of the last one's, over those of the last: twice as many rows of nearly three
-/// times the rays, less what needs none. Times the square of how much finer the image is than the solution.
+/// Rays of a round of half the tolerance over those of the last: twice as many rows of nearly three times the rays,
+/// less what needs none. It is multiplied by the square of how much finer the image is than the solution.
 const ROUND_GROWTH: f64 = 4.0;
 
-/// The same where the solution is coarser than the image. Rows take the power 1.5 of how much finer they are, elements the
-/// rest; above this, corners of mirrors took 40 times the seconds of a finer solution.
+/// Factor on the rays of a round, as [`ROUND_GROWTH`], where the solution is coarser than the image.
+///
+/// Rows take the power 1.5 of how much finer they are, elements the rest. Above it, corners of mirrors took 40 times
+/// the seconds of a finer solution (`cargo run --release --example calibrate`).
 const COARSE_GROWTH: f64 = 3.0;
 
 /// Refuses a tolerance outside 1e-6 to 0.1.

@@ -59,7 +59,7 @@ static MISER: Miser = Miser;
 /// How a run is disturbed.
 #[derive(Clone, Copy)]
 enum Fault {
-    /// The block after so many is refused.
+    /// Number of blocks after which the next is refused.
     Memory(u64),
     /// The caller asks to stop at this call of the progress function.
     Stop(u32),

@@ -37,7 +37,7 @@ pub struct Row {
 const ROUNDING: f64 = 1e-6;
 
 impl Row {
-    /// The true error, less what so many standard errors of the judge explain.
+    /// The true error, less what a number of standard errors of the judge explains.
     fn error(&self, deviations: f64) -> f64 {
         let Score { eps, high, .. } = self.score;
         let noise = high * high - eps * eps;
@@ -78,7 +78,7 @@ pub fn image(hostile: &Hostile) -> (Vec<f64>, Vec<f64>, f64) {
     })
 }
 
-/// Blik's image against the judge's, who may trace so many rays.
+/// Blik's image against the judge's, who may trace a number of rays.
 pub fn judged(hostile: &Hostile, rays: u64, seed: u32) -> Row {
     let (pixels, reference, estimate) = image(hostile);
     let mut memory = Memory::default();

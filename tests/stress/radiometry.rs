@@ -13,7 +13,7 @@ fn view() -> CameraInput {
     orthographic([2.6, 1.9, 1.4], [0.4, 0.4, 0.4], 2.0, 8)
 }
 
-/// A corner of diffuse and mirror facets in sky and sun of so many times an ordinary light.
+/// A corner of diffuse and mirror facets in sky and sun of a multiple of ordinary light.
 fn corner(factor: f64) -> Case {
     let materials =
         [(0.6, 0.1), (0.2, 0.7), (0.5, 0.0)].map(|(d, s)| Material::new(d, s).emitting(0.1 * factor));

@@ -194,7 +194,7 @@ impl Case {
         })
     }
 
-    /// A whole run on so many threads.
+    /// A whole run on a number of threads.
     pub fn run(&self, threads: usize, settings: &Settings, camera: &CameraInput) -> Outcome {
         self.with_lit(threads, settings, |host, lit| outcome(host, lit, camera))
     }

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// Pixels of which the truth is known, about. With the rays given, the standard error of eps_c^2 goes with the root of
-/// their number; so many show an rms error that sits in a tenth of the pixels to 4 %.
+/// their number; that many show an rms error that sits in a tenth of the pixels to 4 %.
 const KNOWN: f64 = 1500.0;
 
 /// Picks the pixels.

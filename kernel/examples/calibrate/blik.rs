@@ -28,7 +28,7 @@ pub struct Outcome {
     pub sampled: Option<Sampled>,
 }
 
-/// Geometry, light and image of a case at `tolerance`, its pixels compared with so many rays through each.
+/// Geometry, light and image of a case at `tolerance`, its pixels compared with `rays` rays through each.
 pub fn run(case: &Case, tolerance: f64, rays: u32) -> Result<Outcome, Error> {
     let host = Host::new(0)?;
     let materials: Vec<MaterialInput<'_>> = case

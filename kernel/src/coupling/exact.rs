@@ -140,7 +140,7 @@ pub(super) struct Known {
     pub shares: [f64; QUARTERS],
     /// Those to mirrors, by the kind of their first one.
     pub mirrored: [[f64; MIRROR_KINDS]; QUARTERS],
-    /// What closes the row where it sees nothing else: entries count so many times.
+    /// Factor on the entries that closes the row where it sees nothing else.
     pub scale: f64,
 }
 
@@ -342,8 +342,9 @@ impl Entries<'_, '_> {
     }
 }
 
-/// Beside what an element touches, light departs from a linear function by so many times more than its quarters' means
-/// do: in a corner of three walls 2.3 times at coarse elements, 1.1 at fine ones.
+/// Factor by which light near a contact may depart further from a linear function than the means over quarters show.
+///
+/// Measured in a corner of three walls: 2.3 on coarse elements, 1.1 on fine ones.
 const CONTACT_CURVATURE_FACTOR: f64 = 2.0;
 
 /// Marks a record as exact until its row ends: its checks are final.

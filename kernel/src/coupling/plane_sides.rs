@@ -13,17 +13,18 @@ use crate::rays::bvh::Bvh;
 use crate::rays::surface::{OFFSET, opens_to_sky};
 use crate::scene::Scene;
 
-/// Sides of facets beyond which no planes are compared: the table's bits grow with their square.
+/// Most sides of facets of a scene whose planes are compared: the table's bits grow with the square of their number.
 pub const SIDES_MOST: usize = 8192;
 
 /// Words of a set of sides.
 pub(crate) const SIDE_SET_WORDS: usize = SIDES_MOST / 64;
 
-/// Facets that rise before a plane by this share of its facet's extent hide no more than that share of it.
+/// Height before a plane, over the extent of the plane's facet, up to which a facet does not count as before it: it
+/// hides no more than that share.
 const PLANE_RISE_SLACK: f64 = 1e-6;
 
-/// Heights and widths below this (scene coordinates) are contact.
-const TOUCHING: f64 = 1e-9;
+/// Heights and widths up to which facets touch, in scene coordinates.
+const CONTACT_DISTANCE: f64 = 1e-9;
 
 /// Facets of a block.
 const PLANE_LANES: usize = 8;
@@ -31,7 +32,8 @@ const PLANE_LANES: usize = 8;
 /// Corners of [`PLANE_LANES`] facets: corner, axis, lane.
 type Corners = [[[f64; PLANE_LANES]; 3]; 3];
 
-/// The sets of facets before each side's plane; none for scenes of more than [`SIDES_MOST`] sides.
+/// Which facets rise before the plane of each facet's side: the candidates for occluders. Empty for scenes of more than
+/// [`SIDES_MOST`] sides.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneSides<'m> {
     before: &'m [u64],
@@ -195,11 +197,12 @@ impl Receiver {
     }
 }
 
-/// Facets that planes leave in question which are tried against the shafts of one receiver: where there are more,
-/// little is found to be clear.
-const TRIES: u32 = 64;
+/// Most facets left in question by planes that are tried against the shafts of one receiver: with more, little is found
+/// unoccluded.
+const SHAFT_TRIES_MOST: u32 = 64;
 
-/// What a receiver sees that nothing hides: sides of facets, and how many elements they have.
+/// Sides of facets that are proven visible from all of a receiver, with nothing between; and how many elements they
+/// have.
 #[derive(Debug)]
 pub struct ProvenVisible<'m> {
     proven: &'m mut [u64],
@@ -266,7 +269,7 @@ impl<'m> ProvenVisible<'m> {
     }
 
     /// Proves what nothing hides from the receiver, as far as `most` elements, `count` those of a side of a facet, and
-    /// `TRIES` go.
+    /// `SHAFT_TRIES_MOST` go.
     pub fn prove(
         &mut self,
         scene: &Scene<'_>,
@@ -275,7 +278,7 @@ impl<'m> ProvenVisible<'m> {
         most: usize,
         count: impl Fn(usize, usize) -> usize,
     ) {
-        let mut tries = TRIES;
+        let mut tries = SHAFT_TRIES_MOST;
         for facet in plane_sides.before(receiver.facet, receiver.side) {
             let (low, high) = heights(scene, facet, &receiver.corners);
             for side in [0, 1] {
@@ -388,7 +391,7 @@ fn range(heights: [f64; 3]) -> (f64, f64) {
 fn overlap(scene: &Scene<'_>, one: usize, other: usize) -> bool {
     let (a, b, normal) = (scene.corners().at(one), scene.corners().at(other), scene.side_normal(one, 0));
     let separates = |axis: Vec3| {
-        let tolerance = TOUCHING * sqrt(axis.length_squared());
+        let tolerance = CONTACT_DISTANCE * sqrt(axis.length_squared());
         let ((al, ah), (bl, bh)) = (range(a.map(|c| c.dot(axis))), range(b.map(|c| c.dot(axis))));
         ah <= bl + tolerance || bh <= al + tolerance
     };
@@ -397,7 +400,7 @@ fn overlap(scene: &Scene<'_>, one: usize, other: usize) -> bool {
     // boxes first: most facets of a plane are far apart
     let far = axes.iter().any(|axis| {
         let ((al, ah), (bl, bh)) = (range(a.map(|c| c.dot(*axis))), range(b.map(|c| c.dot(*axis))));
-        ah + TOUCHING < bl || bh + TOUCHING < al
+        ah + CONTACT_DISTANCE < bl || bh + CONTACT_DISTANCE < al
     });
     !far && !sides(a).into_iter().chain(sides(b)).any(separates)
 }
@@ -407,7 +410,7 @@ fn is_separated(a: &[Vec3; 3], b: &[Vec3; 3], (facet, normal): (&[Vec3; 3], Vec3
     let base = facet.iter().map(|c| c.dot(normal)).sum::<f64>() / 3.0;
     let heights = |t: &[Vec3; 3]| range(t.map(|c| c.dot(normal) - base));
     let ((al, ah), (bl, bh)) = (heights(a), heights(b));
-    if al.min(bl) >= -TOUCHING || ah.max(bh) <= TOUCHING {
+    if al.min(bl) >= -CONTACT_DISTANCE || ah.max(bh) <= CONTACT_DISTANCE {
         return true;
     }
     // the planes through a side of one and a corner of the other
@@ -417,12 +420,12 @@ fn is_separated(a: &[Vec3; 3], b: &[Vec3; 3], (facet, normal): (&[Vec3; 3], Vec3
             other.iter().any(|corner| {
                 let plane = (to - from).cross(*corner - from);
                 let length = sqrt(plane.length_squared());
-                let tolerance = TOUCHING * length;
+                let tolerance = CONTACT_DISTANCE * length;
                 let of = |t: &[Vec3; 3]| range(t.map(|c| (c - from).dot(plane)));
                 let ((ol, oh), (tl, th), (fl, fh)) = (of(one), of(other), of(facet));
                 let below = oh.max(th) <= tolerance && fl >= -tolerance;
                 let above = ol.min(tl) >= -tolerance && fh <= tolerance;
-                length > TOUCHING && (below || above)
+                length > CONTACT_DISTANCE && (below || above)
             })
         })
     };

@@ -30,7 +30,8 @@ fn fixed(rows: usize, capacity: usize, bands: usize) -> Need {
     Need::new().and::<Head>(1).and::<Row>(rows + 1).and::<MirrorPath>(capacity).and::<f64>(capacity * bands)
 }
 
-/// The most of a chain that is closed: beyond, what it met so far says too little of the rest.
+/// Largest remainder of a chain's light that is taken to go on as it went so far; beyond, what the chain met says too
+/// little of the rest.
 pub(crate) const CLOSED_REMAINDER_MOST: f64 = 0.5;
 
 /// The rows of a block while they are being written.

@@ -54,10 +54,10 @@ pub struct RowSettings {
 /// Parts of an element: its quarters.
 const ELEMENT_PARTS: usize = QUARTERS;
 
-/// Parts of the parts.
+/// Number of parts of an element's parts: the quarters' quarters.
 const ROW_BINS: usize = ELEMENT_PARTS * ELEMENT_PARTS;
 
-/// The most rays of one row: each part's sequence has 2^16 points.
+/// Most rays of one row: each part's sequence has 2^16 points.
 pub const ROW_RAYS_MOST: u32 = (ELEMENT_PARTS as u32) << 16;
 
 /// The gradients, in local coordinates, of the linear function through what the exposed parts see, by what each of
@@ -91,34 +91,36 @@ fn departures(open: [bool; ELEMENT_PARTS]) -> [f64; ELEMENT_PARTS] {
     })
 }
 
-/// The most entries in closed form of one row.
+/// Most entries in closed form of one row.
 const ROW_CLOSED_FORMS_MOST: usize = 4096;
 
-/// Entries in closed form up to which all are entered where nothing hides any.
-const CHEAP: usize = 1024;
+/// Number of entries in closed form up to which all are entered where nothing hides any: they are exact, and cost less
+/// than the fewest rays.
+const CLOSED_FORMS_CHEAP: usize = 1024;
 
-/// Entries in closed form that cost as much as a ray.
-const RAY: f64 = 0.35;
+/// Number of entries in closed form that cost as much as a ray. Measured by `cargo bench --bench counts`.
+const CLOSED_FORMS_PER_RAY: f64 = 0.35;
 
-/// Entries in closed form that together exceed the hemisphere by this hide one another, whatever was proven.
-const OVERFULL: f64 = 0.02;
+/// Largest excess of a row's sum over the hemisphere, as a share of it, at which its entries in closed form are kept.
+/// Above it they hide one another, whatever was proven.
+const HEMISPHERE_EXCESS_MOST: f64 = 0.02;
 
 /// Rays of the largest elements, over those of a facet of mean area.
-const MOST_FACTOR: f64 = 2.0;
+const AREA_RAYS_FACTOR_MOST: f64 = 2.0;
 
 /// Rays of the smallest elements, over those of a facet of mean area.
-const LEAST_FACTOR: f64 = 0.25;
+const AREA_RAYS_FACTOR_LEAST: f64 = 0.25;
 
-/// Rays that meet their first facets together: few where the stack is small.
+/// Number of rays that meet their first facets together: few where the stack is small.
 const ROW_RAYS_TOGETHER: usize = if cfg!(feature = "std") { STREAM_RAYS } else { 4 };
 
-/// The fewest rays of a row.
+/// Fewest rays of a row.
 const ROW_RAYS_FEWEST: u32 = 64;
 
-/// Fewer rays from outside a body say less of an element than what is beside it.
+/// Fewest rays from outside a body that tell of an element; with fewer, its neighbour stands for it.
 const LEAST_EXPOSED: u32 = 32;
 
-/// The power of two nearest to so many rays.
+/// The power of two nearest to a number of rays.
 fn whole(rays: f64) -> u32 {
     let most = (clamp(rays, f64::from(ROW_RAYS_FEWEST), f64::from(ROW_RAYS_MOST)) * SQRT_2) as u32;
     1 << most.checked_ilog2().unwrap_or(0)
@@ -127,15 +129,16 @@ fn whole(rays: f64) -> u32 {
 impl RowSettings {
     /// The most rays of a row.
     pub fn most_rays(&self) -> u32 {
-        whole(MOST_FACTOR * f64::from(self.rays))
+        whole(AREA_RAYS_FACTOR_MOST * f64::from(self.rays))
     }
 
-    /// The same with half the rays; `None` where a row has the fewest.
+    /// Settings with half the rays; `None` where a row has the fewest.
     pub fn fewer(self) -> Option<Self> {
         (self.rays > ROW_RAYS_FEWEST).then_some(RowSettings { rays: self.rays / 2, ..self })
     }
 
-    /// The same with as many rays as make no more than `budget` first rays of so many rows, or the fewest.
+    /// Settings with at most as many rays as keep the first rays of `rows` rows within `budget`, but no fewer than the
+    /// fewest.
     pub fn within(mut self, rows: usize, budget: u64) -> Self {
         while u64::from(self.most_rays()).saturating_mul(rows as u64) > budget {
             let Some(fewer) = self.fewer() else { break };
@@ -366,14 +369,14 @@ impl Tracer<'_, '_> {
         let corners = self.elements.corners(self.scene, start.element);
         let receiver = Receiver { facet: start.facet, side: start.side, normal, corners };
         let count = |facet: usize, side: usize| self.elements.unknowns_of(facet, side).count();
-        let limit = (2 * most as usize).clamp(CHEAP, ROW_CLOSED_FORMS_MOST);
+        let limit = (2 * most as usize).clamp(CLOSED_FORMS_CHEAP, ROW_CLOSED_FORMS_MOST);
         let possible = ProvenVisible::possible(self.scene, self.plane_sides, &receiver, count);
         if possible == 0 || possible > limit {
             return Some(false);
         }
         let mut clear = ProvenVisible::new(proven);
         clear.all = false;
-        if possible <= CHEAP {
+        if possible <= CLOSED_FORMS_CHEAP {
             clear.all = true;
             clear.prove(self.scene, self.plane_sides, &receiver, limit, count);
         }
@@ -408,14 +411,15 @@ impl Tracer<'_, '_> {
             departures: departures(all),
         };
         entries.add(&receiver, self.plane_sides, &clear, &mut tally.known)?;
-        let sound = tally.known.share() > 0.0 && tally.known.share() <= 1.0 + OVERFULL;
+        let sound = tally.known.share() > 0.0 && tally.known.share() <= 1.0 + HEMISPHERE_EXCESS_MOST;
         if !sound {
             self.builder.drop_row();
         }
         Some(sound)
     }
 
-    /// Whether so many entries in closed form cost less than the rays that they spare, as far as the first few tell.
+    /// Whether `entries` entries in closed form cost less than the rays that they spare, as far as the first few rays
+    /// tell.
     fn is_worth(&mut self, start: &Start, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
         if entries <= ROW_RAYS_FEWEST as usize {
             return Some(true);
@@ -426,7 +430,7 @@ impl Tracer<'_, '_> {
         }
         self.builder.drop_row();
         let wanted = enough(most, tally.rays, f64::from(tally.blocked));
-        Some(f64::from(wanted) * RAY >= entries as f64)
+        Some(f64::from(wanted) * CLOSED_FORMS_PER_RAY >= entries as f64)
     }
 
     /// As many rays as are needed, from the first number up to the second; those that start inside a body in parts named
@@ -457,10 +461,11 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    /// Rays of an element of so much area: the image's mean square error, the sum of a n^-4/3 over all elements, is least
-    /// for a given number of rays where n goes with a^3/7.
+    /// Rays of an element of area a. The image's mean square error is the sum of a n^-4/3 over all elements; for a
+    /// given number of rays it is least where n goes with a^3/7.
     fn most_rays(&self, area: f64) -> u32 {
-        let factor = clamp(pow(area / self.mean_area, 3.0 / 7.0), LEAST_FACTOR, MOST_FACTOR);
+        let factor =
+            clamp(pow(area / self.mean_area, 3.0 / 7.0), AREA_RAYS_FACTOR_LEAST, AREA_RAYS_FACTOR_MOST);
         whole(factor * f64::from(self.settings.rays))
     }
 

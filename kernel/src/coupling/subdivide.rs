@@ -25,39 +25,45 @@ use core::ops::Range;
 /// Probed points of a triangle: the middles of its quarters' quarters.
 const PROBE_POINTS: usize = QUARTERS * QUARTERS;
 
-/// The most rays from one of them.
+/// Most rays from one probed point.
 pub const PROBE_RAYS_MOST: u32 = 1024;
 
-/// The fewest.
-const FEWEST_RAYS: u32 = 16;
+/// Fewest rays from one probed point.
+const PROBE_RAYS_FEWEST: u32 = 16;
 
-/// Points that meet this share of black backs lie inside a body, where nothing sees them.
+/// Share of black backs among the first hits of a point from which on it lies inside a body, where nothing sees it.
 pub const INSIDE: f64 = 0.9375;
 
-/// The most facets that a triangle's points see for which closed forms cost less than rays.
+/// Most facets seen by a triangle's points for which closed forms cost less than rays.
 const PROBE_CLOSED_FORMS_MOST: usize = 2048;
 
-/// Unevenness counts from so many times the noise of half the rays on: one even triangle in ten thousand passes.
-const CERTAIN: f64 = 1.0;
+/// Least unevenness that counts, in units of its noise (estimated from half of the rays), once a point has all its
+/// rays.
+///
+/// An even triangle exceeds it with the probability 1e-4.
+const UNEVENNESS_CERTAIN: f64 = 1.0;
 
-/// From so many times on nothing is gained by more rays.
-const CLEAR: f64 = 4.0;
+/// Unevenness, in units of its noise, above which a triangle takes no more rays: they would not change the decision.
+const UNEVENNESS_CLEAR: f64 = 4.0;
 
-/// Unevenness of a triangle of which half is hidden in a body, times 4: points near the edge see part of the inside.
+/// Unevenness of a triangle half of which is hidden in a body, times 4: points near the edge see part of the inside.
 const HALF_HIDDEN_UNEVENNESS: f64 = 0.04;
 
-/// What a quarter keeps of the unevenness of a smooth function.
-const SMOOTH: f64 = 1.0 / 16.0;
+/// Share of the unevenness of a smooth function that a quarter keeps.
+const QUARTER_UNEVENNESS: f64 = 1.0 / 16.0;
 
-/// Longest edge of detail before a triangle, over the root of its area. Rays of its points meet what is larger: of a box on a
-/// floor fifty times as long they miss the box at a quarter of this, and the image is wrong by 3.5e-2 in silence.
+/// Longest edge of detail before a triangle, over the root of the triangle's area, for which the triangle is quartered.
+///
+/// Rays of its points meet what is larger. Of a box on a floor fifty times as long they miss the box at a quarter of
+/// this value, and the image is wrong by 3.5e-2 with no sign of it.
 const DETAIL: f64 = 0.5;
 
-/// Distance of detail over the root of the triangle's area, up to which the triangle is quartered: light then changes over
-/// lengths like the distance, which two quarters' size is to match.
+/// Largest distance of detail from a triangle, over the root of the triangle's area, for which the triangle is
+/// quartered: light changes over lengths like the distance, which two quarters' size is to match.
 const DETAIL_REACH: f64 = 0.5;
 
-/// Facets that are looked at for detail near a triangle. More that are near, and none of them small, are as large as it.
+/// Most facets that are examined for detail near a triangle. If more are near, and none of them small, they are as
+/// large as it.
 const DETAIL_FACETS: u32 = 1024;
 
 /// Unevenness of triangles with detail before them.
@@ -98,11 +104,11 @@ pub struct Level<'a> {
     area: f64,
 }
 
-/// Area of a facet that counts, over the area of all smaller ones: the view is of them where it is larger by far, as ground
-/// is that they stand on.
-const LARGER: f64 = 8.0;
+/// Largest area of a facet that counts, over that of all smaller ones. A view is of those where it is larger by far, as
+/// the ground that they stand on.
+const COUNTED_AREA_RATIO: f64 = 8.0;
 
-/// The area over which the mean square error is taken, that of all facets: each adds up to [`LARGER`] times what those up to
+/// The area over which the mean square error is taken, that of all facets: each adds up to [`COUNTED_AREA_RATIO`] times what those up to
 /// its size, to a factor of 2, add.
 fn counted_area(areas: &[f64]) -> f64 {
     const SIZES: usize = 64;
@@ -121,8 +127,8 @@ fn counted_area(areas: &[f64]) -> f64 {
     for (sum, count) in sums.into_iter().zip(counts).filter(|(_, count)| *count > 0) {
         let each = sum / count as f64;
         let mut left = count;
-        while left > 0 && total < each / LARGER {
-            total += if total > 0.0 { LARGER * total } else { each };
+        while left > 0 && total < each / COUNTED_AREA_RATIO {
+            total += if total > 0.0 { COUNTED_AREA_RATIO * total } else { each };
             left -= 1;
         }
         total += left as f64 * each;
@@ -130,7 +136,7 @@ fn counted_area(areas: &[f64]) -> f64 {
     total.max(f64::MIN_POSITIVE)
 }
 
-/// Elements that a mesh of any facets may have beyond them, at a tolerance of 2e-3.
+/// Number of elements beyond its facets that any mesh may have, at a tolerance of 2e-3.
 const MESH_ELEMENTS_FREE: f64 = 4096.0;
 
 /// The most elements of a scene of `facets` facets: 1 + 2e-3/tolerance times as many, and some more for coarse meshes.
@@ -139,7 +145,7 @@ pub fn most_elements(facets: usize, tolerance: f64) -> usize {
     (facets as f64 * (1.0 + finer) + MESH_ELEMENTS_FREE * finer.min(1.0)) as usize
 }
 
-/// Nodes of a tree with so many leaves.
+/// Most nodes of the trees of `facets` facets: those of trees with [`most_elements`] leaves.
 fn most_nodes(facets: usize, tolerance: f64) -> usize {
     // each cut adds four nodes and three elements
     facets.saturating_add(
@@ -148,7 +154,7 @@ fn most_nodes(facets: usize, tolerance: f64) -> usize {
 }
 
 impl<'m> SubdivisionTree<'m> {
-    /// Bytes for a scene of so many facets.
+    /// Bytes for the trees of `facets` facets.
     pub fn bytes(facets: usize, tolerance: f64) -> Result<usize, Error> {
         let nodes = most_nodes(facets, tolerance);
         // two sides and the flag bit of a coupling's record must fit into 32 bits
@@ -236,7 +242,8 @@ impl<'m> SubdivisionTree<'m> {
             self.nodes.set(at, Node { child: self.used as u32, ..node });
             for quarter in 0..QUARTERS {
                 self.nodes.set(self.used, Node { path: path.step(quarter).0, child: 0, ..node });
-                self.unevenness.set(self.used, SMOOTH * value / weight(&node).max(f64::MIN_POSITIVE));
+                self.unevenness
+                    .set(self.used, QUARTER_UNEVENNESS * value / weight(&node).max(f64::MIN_POSITIVE));
                 self.used += 1;
             }
         }
@@ -301,7 +308,7 @@ impl Level<'_> {
         if out.len() != span(&range) {
             return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
         }
-        let rays = rays.clamp(FEWEST_RAYS, PROBE_RAYS_MOST);
+        let rays = rays.clamp(PROBE_RAYS_FEWEST, PROBE_RAYS_MOST);
         let many = most_elements(scene.facets(), budget.solution) as f64;
         let mut probe = Probe { scene, bvh, plane_sides, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
@@ -398,7 +405,7 @@ impl Probe<'_> {
         let sequence = Sequence::new(hash2((facet * 2 + side) as u32, 0x5b0b_e000 ^ node.path));
         let (mut sums, mut half, mut backs) =
             ([0.0; PROBE_POINTS], [0.0; PROBE_POINTS], [0u32; PROBE_POINTS]);
-        let (mut index, mut goal) = (0, FEWEST_RAYS.min(self.rays));
+        let (mut index, mut goal) = (0, PROBE_RAYS_FEWEST.min(self.rays));
         loop {
             while index < goal {
                 if 2 * index == goal {
@@ -413,11 +420,11 @@ impl Probe<'_> {
             let inside = |backs: u32| f64::from(backs) >= INSIDE * f64::from(index);
             let seen = backs.map(|b| !inside(b));
             let (even, noise) = residuals(&half, &sums, &seen, 0.5 * f64::from(index));
-            if even + noise < self.negligible || even > CLEAR * noise {
+            if even + noise < self.negligible || even > UNEVENNESS_CLEAR * noise {
                 return even;
             }
             if goal >= self.rays {
-                return if even > CERTAIN * noise { even } else { expected.min(noise) };
+                return if even > UNEVENNESS_CERTAIN * noise { even } else { expected.min(noise) };
             }
             goal = (2 * goal).min(self.rays);
         }
@@ -439,7 +446,7 @@ impl Probe<'_> {
         Some(self.closed_residuals(&receiver, &clear, points))
     }
 
-    /// The same of a triangle for which all that is clear is known.
+    /// The unevenness of a triangle whose visible facets are all proven, by closed forms.
     // apart: its sums do not burden the stack of the proof
     #[inline(never)]
     fn closed_residuals(

@@ -48,7 +48,7 @@ pub(super) struct HalvingPath {
 }
 
 impl HalvingPath {
-    /// On to the lower half; false where that is more than so many steps, at most 32.
+    /// Steps down to the lower half; false where that is deeper than `most`, at most 32.
     pub(super) fn down(&mut self, most: u32) -> bool {
         if self.steps >= most {
             return false;

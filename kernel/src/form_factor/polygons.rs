@@ -40,7 +40,7 @@ pub struct Polygons<'m, P> {
     isa: Isa,
 }
 
-/// Patches of a polygon with so many corners.
+/// Patches of a polygon of `corners` corners.
 fn patch_count(corners: usize) -> usize {
     (corners.saturating_sub(1) / 2).max(1)
 }

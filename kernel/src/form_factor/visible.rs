@@ -19,8 +19,8 @@ const STORED: usize = 6;
 /// Times that a patch of the receiver is halved, at least: to meet a small shadow at all.
 const SHALLOWEST: u32 = 6;
 
-/// So many times more where patches are larger than the target is high above them: two resolutions of a narrow gap agree
-/// by chance.
+/// Factor on the resolution where patches are larger than the target is high above them: two resolutions of a narrow
+/// gap agree by chance.
 const NEAR_RESOLUTION_FACTOR: u32 = 4;
 
 /// Times that a patch of the receiver is halved, at most.

@@ -207,7 +207,7 @@ impl Report {
         ]
     }
 
-    /// Puts the part of an image of so many pixels in and draws the conclusions.
+    /// Adds the part of an image of `pixels` pixels and draws the conclusions.
     pub(super) fn finish(&mut self, tally: &Tally, pixels: usize, budget: &ErrorBudget) {
         self.skip("pixels beside the object", (pixels as u64).saturating_sub(tally.object_pixels));
         self.skip("pixels of which the centre is enough", (pixels as u64).saturating_sub(tally.refined));

@@ -17,7 +17,7 @@ use core::ops::Range;
 /// How the half circle of an unknown is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// The paper's: the exact form factor of each element seen times the radiance at its centre, and so many
+    /// The paper's: the exact form factor of each element seen times the radiance at its centre, and `chains`
     /// mirror chains for each element (0: no light by way of mirrors, which is wrong where there are any).
     Facets {
         /// Chains an element.
@@ -335,7 +335,8 @@ impl Station<'_> {
         part(span.to, sink, scratch);
     }
 
-    /// Calls `change` with the sines between two probes at which the chain changes, in order, found by so many bisections.
+    /// Calls `change` with the sines between two probes at which the chain changes, in order, each found by
+    /// `bisections` bisections.
     fn changes(&self, mut a: Probe, mut b: Probe, bisections: usize, mut change: impl FnMut(f64)) {
         // ends of the intervals to the right, and the bisections that are left for them
         let (mut ends, mut waiting, mut depth) = ([(b, 0); BISECTIONS], 0, bisections);

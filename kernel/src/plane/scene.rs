@@ -31,13 +31,14 @@ pub enum RaySet {
         /// Share A(theta) among the rays above the surface.
         renormalised: bool,
     },
-    /// Gauss nodes in the visible lobe's energy: so many at the first lobe of a path, the second, and later.
+    /// Numbers of Gauss nodes in the visible lobe's energy: at the first lobe of a path, the second, and later.
     Gauss([u32; 3]),
-    /// Midpoints of so many equal shares of the visible lobe's energy.
+    /// Numbers of equal shares of the visible lobe's energy, each with a ray at its midpoint: at the first lobe of a
+    /// path, the second, and later.
     Equal([u32; 3]),
-    /// The visible lobe is split at the silhouettes seen from the point: exact for what escapes to a uniform
-    /// sky, and so many Gauss nodes in each part that meets a body. At the fourth lobe of a path and later,
-    /// Gauss nodes in the whole.
+    /// Numbers of Gauss nodes in each part of the visible lobe that meets a body; the lobe is split at the silhouettes
+    /// seen from the point, and what escapes to a uniform sky is exact. At the fourth lobe of a path and later: Gauss
+    /// nodes in the whole lobe.
     Split([u32; 3]),
 }
 
@@ -127,7 +128,7 @@ pub enum Basis {
     Constant,
     /// One unknown an element, linear between the elements' centres.
     Linear,
-    /// So many unknowns an element (1 to [`MAX_ORDER`]), the polynomial through its Gauss points.
+    /// Number of unknowns of an element (1 to [`MAX_ORDER`]): the polynomial through its Gauss points.
     Panels(u32),
 }
 
@@ -265,7 +266,7 @@ impl<'m> PlaneScene<'m> {
         PlaneScene::bytes_for(primitives, input.bodies.len(), input.materials.len())
     }
 
-    /// The same for so many circles and segments, bodies and materials.
+    /// As [`PlaneScene::bytes`], by the numbers of circles and segments, bodies and materials.
     pub fn bytes_for(primitives: usize, bodies: usize, materials: usize) -> Result<usize, Error> {
         Need::new().and::<Primitive>(primitives).and::<Body>(bodies).and::<Material>(materials).bytes()
     }

@@ -59,7 +59,7 @@ impl<'m> Scratch<'m> {
         })
     }
 
-    /// An error where it has no room for sweeps of this scene with so many cuts.
+    /// An error where it has no room for sweeps of this scene with `cuts` cuts.
     pub(crate) fn check(&self, scene: &PlaneScene<'_>, cuts: usize) -> Result<(), Error> {
         if self.fits(scene, cuts) { Ok(()) } else { Err(Error::Mismatch { what: "plane scratch" }) }
     }

@@ -20,21 +20,22 @@ use crate::scene::sky::Sky;
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
 
-/// Variance of a linear function through what three quarters see, over that of the mean of all four: of independent
-/// quarters 1 + 8/3.
-const LINEAR: f64 = 11.0 / 3.0;
+/// Variance of a linear function through what three quarters see, over that of the mean of all four: 1 + 8/3 for
+/// independent quarters.
+const LINEAR_VARIANCE: f64 = 11.0 / 3.0;
 
 /// Mean square departure from a linear function over that of the middle from the corners: 1.1 for a parabola, 1.6 for
 /// quadratic functions at large, 1.8 beside walls, 2.4 for jumps.
-const DEPARTURE: f64 = 2.0;
+const DEPARTURE_FACTOR: f64 = 2.0;
 
-/// What a row has not seen of a radiance like the reference, in rays: what is met by none of n has some 1/(2n) of them.
+/// Radiance that a row's rays have not met, in rays: an object that none of n rays meets fills some 1/(2n) of the
+/// hemisphere.
 pub const ROW_UNSEEN_RAYS: f64 = 0.5;
 
-/// The most products of [`propagate`]: in a room of albedo 0.85 a seventh is left out.
+/// Most products of [`propagate`]: in a room of albedo 0.85 they leave out a seventh.
 const MOST_CARRIED: u32 = 12;
 
-/// What the products of [`propagate`] leave out, where so few leave out so little.
+/// Largest share of the carried errors that products left out may have. Products end there, or at [`MOST_CARRIED`].
 const LEFT_OUT: f64 = 5e-3;
 
 /// How often [`propagate`] is called, and the products that it and [`rows`] make: each brings at most q of
@@ -104,8 +105,8 @@ impl LaneTask for Differences<'_, '_> {
             for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
                 let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
                 let [first, second, one, other] = sums.map(|s| scale * s);
-                let noise = LINEAR * (first * first + second * second);
-                *out = [narrow(first + second), narrow(noise + DEPARTURE * (one * other).max(0.0))];
+                let noise = LINEAR_VARIANCE * (first * first + second * second);
+                *out = [narrow(first + second), narrow(noise + DEPARTURE_FACTOR * (one * other).max(0.0))];
             }
         }
     }

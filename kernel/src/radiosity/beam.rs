@@ -55,15 +55,15 @@ impl BeamSettings {
     }
 }
 
-/// Records of a row at which those of the same element are added up for the first time.
-const FOLD: usize = 1024;
+/// Records of a row at which those of one element are added up for the first time.
+const RECORDS_UNMERGED: usize = 1024;
 
 /// About the records that one row needs while it grows: two for each ray, or twice as many as there are different ones.
 pub fn unmerged(scene: &Scene<'_>, elements: &Elements<'_>, settings: &BeamSettings) -> usize {
     let largest = scene.areas().iter().fold(0.0, |a: f64, &b| a.max(b));
     let rays = (clamp(largest * settings.density, FACET_BEAM_RAYS_FEWEST, FACET_BEAM_RAYS_MOST) as usize)
         .next_power_of_two();
-    (2 * rays).min(FOLD + elements.unknowns().saturating_mul(8))
+    (2 * rays).min(RECORDS_UNMERGED + elements.unknowns().saturating_mul(8))
 }
 
 /// Area of a mirror facet's side as the sun sees it; 0 where it mirrors nothing.
@@ -122,7 +122,7 @@ impl Tracer<'_, '_> {
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
         let mut stats = Row { state: TRACED, rays, ..Row::default() };
-        let mut fold = FOLD;
+        let mut fold = RECORDS_UNMERGED;
         for first in (0..rays).step_by(BEAM_RAYS_UNMERGED) {
             let end = rays.min(first + BEAM_RAYS_UNMERGED as u32);
             for start in (first..end).step_by(BEAM_RAYS_TOGETHER) {
@@ -135,7 +135,7 @@ impl Tracer<'_, '_> {
                 )?;
             }
             if self.builder.present() >= fold {
-                fold = FOLD.max(2 * self.builder.merge_duplicates(Record::join_beam));
+                fold = RECORDS_UNMERGED.max(2 * self.builder.merge_duplicates(Record::join_beam));
             }
         }
         let share = 1.0 / f64::from(rays);
@@ -244,7 +244,7 @@ impl Tracer<'_, '_> {
     }
 }
 
-/// Rays of a mirror after which records are folded.
+/// Rays of a mirror after which the row's records are merged.
 const BEAM_RAYS_UNMERGED: usize = 32;
 
 /// Rays that are traced together: they wait on the stack, which is small where there is no standard library.

@@ -189,7 +189,7 @@ const SUN_BATCH: usize = if cfg!(feature = "std") { 32 } else { 8 };
 /// straight, 1; of an element partly inside a body, the mean over the rest of it. Returns the rays traced.
 ///
 /// Rows that the coupling left out get 0. The error is 0 for elements in full light or shadow, and about 2.6 % of the cosine
-/// at [`SUN_POINTS_MOST`] points for others.
+/// at 128 points for others.
 pub fn sun_rows(
     scene: &Scene<'_>,
     bvh: &Bvh<'_>,

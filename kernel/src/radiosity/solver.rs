@@ -17,30 +17,31 @@ use crate::base::math::fabs;
 use crate::radiosity::sweeps;
 use crate::scene::{MAX_BANDS, Scene};
 
-/// Solutions that [`History`] keeps.
+/// Number of solutions that [`History`] keeps.
 const HISTORY_SOLUTIONS: usize = 3;
 
-/// More plain sweeps than this are not made where faster ones may be.
-const PLAIN: u32 = 48;
+/// Most plain sweeps; where more are needed, faster ones are made.
+const PLAIN_SWEEPS_MOST: u32 = 48;
 
-/// Relative rounding of a row's sum, of which mirrors make some ten thousand terms: measured in closed boxes to be up
+/// Relative rounding of a row's sum, of which mirrors make some ten thousand terms. Measured in closed boxes to be up
 /// to half of it.
 const MATRIX_ROUNDING: f64 = 128.0 * f64::EPSILON;
 
-/// The most sweeps of the faster kind.
+/// Most sweeps of the accelerated iteration.
 const SWEEPS_MOST: u32 = 1000;
 
-/// Blocks of Chebyshev's sweeps and where their interval ends: the few modes beyond are left to the extrapolation. The
-/// next one is taken where a block did not bring [`PROGRESS`].
+/// Numbers of sweeps of the blocks of Chebyshev's iteration, and where their interval ends: the few modes beyond are
+/// left to the extrapolation. The next longer one is taken where a block did not bring [`BLOCK_PROGRESS`].
 const CHEBYSHEV_BLOCKS: [(u32, f64); 4] = [(16, 0.9), (32, 0.97), (64, 0.99), (128, 0.999)];
 
-/// A block is to shrink the change of a sweep to this share.
-const PROGRESS: f64 = 0.05;
+/// Share of the change before a block that may be left after it; above it the next block is longer.
+const BLOCK_PROGRESS: f64 = 0.05;
 
-/// Less than this share even of the longest block: rounding is all that changes, or modes that are not meant.
-const STUCK: f64 = 0.5;
+/// Share of the change before the longest block that may be left after it. Above it only rounding changes, or modes
+/// that Chebyshev's iteration does not suit.
+const BLOCK_STUCK: f64 = 0.5;
 
-/// Rows that sum to this or more cannot be told from closed ones.
+/// Sum of a row from which on it cannot be told from a closed one.
 const CLOSED_ROW_SUM: f64 = 1.0 - 1e-12;
 
 /// Solutions' worth of memory that [`History`] needs beside the two that plain sweeps work on: 0 where the scene's
@@ -48,13 +49,13 @@ const CLOSED_ROW_SUM: f64 = 1.0 - 1e-12;
 pub fn kept(scene: &Scene<'_>, goal: f64, max_bounces: Option<u32>) -> usize {
     // mirrors of at most s bring at most 1 + s + s^2 + ... times a row's share of the hemisphere
     let q = scene.largest_diffuse() / (1.0 - scene.largest_specular()).max(f64::MIN_POSITIVE);
-    let few = sweeps(q.min(1.0), goal) <= PLAIN;
+    let few = sweeps(q.min(1.0), goal) <= PLAIN_SWEEPS_MOST;
     if few || max_bounces.is_some() { 0 } else { HISTORY_SOLUTIONS + 1 }
 }
 
-/// Share of the goal that the faster sweeps go on to: they are for rooms that shine many times brighter than what lights them,
-/// and where mirrors brighten that once more.
-const FINER: f64 = 1e-2;
+/// Share of the goal that accelerated sweeps go on to: they are for rooms many times brighter than what lights them,
+/// which mirrors brighten once more.
+const FAST_GOAL_SHARE: f64 = 1e-2;
 
 /// How an iteration goes on, and when it ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,7 +94,7 @@ impl Acceleration {
         Acceleration { plain, left: 0, omega: 1.0, interval, block: 0, slow: false, before: f64::INFINITY }
     }
 
-    /// After a sweep that changed so much; false where going on brings nothing.
+    /// Counts a sweep that changed the radiances by at most `change`; false where going on brings nothing.
     fn step(&mut self, q: f64, change: f64, near: bool) -> bool {
         let squared = self.interval * self.interval;
         if self.plain == 0 {
@@ -109,8 +110,8 @@ impl Acceleration {
         if self.plain > 0 {
             return true;
         }
-        if change > PROGRESS * self.before {
-            if change > STUCK * self.before && self.block + 1 == CHEBYSHEV_BLOCKS.len() {
+        if change > BLOCK_PROGRESS * self.before {
+            if change > BLOCK_STUCK * self.before && self.block + 1 == CHEBYSHEV_BLOCKS.len() {
                 if self.slow {
                     return false;
                 }
@@ -131,7 +132,7 @@ impl Solver {
     pub fn new(q: f64, inverse: Option<f64>, goal: f64, max_bounces: Option<u32>, fast: bool) -> Solver {
         let inverse = inverse.unwrap_or(1.0 / (1.0 - q).max(f64::MIN_POSITIVE));
         let needed = sweeps(q, goal);
-        let fast = fast && max_bounces.is_none() && needed > PLAIN;
+        let fast = fast && max_bounces.is_none() && needed > PLAIN_SWEEPS_MOST;
         // a sweep adds a reflection, and so does what sees the radiances
         let most = match max_bounces {
             Some(bounces) => bounces.saturating_sub(1),
@@ -139,7 +140,7 @@ impl Solver {
             None => needed.saturating_add(200).min(100_000),
         };
         let acceleration = fast.then(|| Acceleration::new(q));
-        let goal = if fast { FINER * goal } else { goal };
+        let goal = if fast { FAST_GOAL_SHARE * goal } else { goal };
         Solver { done: 0, error: f64::INFINITY, q, inverse, goal, most, acceleration }
     }
 

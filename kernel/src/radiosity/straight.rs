@@ -23,7 +23,7 @@ const FEW_POINTS: f64 = 8.0 / 3.0;
 
 /// Mean square departure from a linear function that four points may not show, over the mean square of the function's own
 /// slope: a shadow's edge along a narrow facet had a twelfth of it, where the points showed a hundredth of that.
-const SLOPE: f64 = 0.1;
+const UNSEEN_SLOPE: f64 = 0.1;
 
 /// Depth of the smallest quarters that are looked at. Where irradiances are asked for, 64 points, as rows have rays from;
 /// images average over elements: 16 points took the airplane's elements twice the seconds and left its error.
@@ -31,10 +31,11 @@ pub fn deepest(all_irradiances: bool) -> u32 {
     if all_irradiances { 3 } else { 1 }
 }
 
-/// The most by which a row's entries are multiplied.
-const MOST_SCALE: f64 = 2.0;
+/// Largest factor on a row's entries.
+const ROW_SCALE_MOST: f64 = 2.0;
 
-/// Difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is 1 to 5e-16.
+/// Largest difference of two blocked shares that is rounding: a row whose rays meet no sky keeps its own sum, which is
+/// 1 to 5e-16.
 pub const BLOCKED_ROUNDING: f64 = 1e-6;
 
 /// Mean square departure of what is blocked from a linear function, in squares of the goal, from which on quarters are cut
@@ -84,7 +85,7 @@ impl<'a> Straight<'a> {
                 if fabs(blocked - row.blocked) < BLOCKED_ROUNDING {
                     return 1.0;
                 }
-                clamp(blocked / row.blocked, 1.0 / MOST_SCALE, MOST_SCALE)
+                clamp(blocked / row.blocked, 1.0 / ROW_SCALE_MOST, ROW_SCALE_MOST)
             }
             _ => 1.0,
         }
@@ -236,8 +237,8 @@ fn row(
     }
     let row = of.coupling.row(unknown);
     let hidden = fit.mean(bands);
-    let least = row.blocked / MOST_SCALE - BLOCKED_ROUNDING;
-    if row.state >= TRACED && !(least..=row.blocked * MOST_SCALE + BLOCKED_ROUNDING).contains(&hidden) {
+    let least = row.blocked / ROW_SCALE_MOST - BLOCKED_ROUNDING;
+    if row.state >= TRACED && !(least..=row.blocked * ROW_SCALE_MOST + BLOCKED_ROUNDING).contains(&hidden) {
         // the row's rays have missed what hides the sky: nothing says what comes from there
         return None;
     }
@@ -331,7 +332,8 @@ impl Fit {
         let [mean, a, b] = self.linear(of);
         let bend = factor * ((square - mean * sum - a * u - b * v) / free as f64).max(0.0);
         // four points may lie in a plane by chance
-        let slope = if self.points == QUARTERS { SLOPE * (a * u + b * v) / self.points as f64 } else { 0.0 };
+        let slope =
+            if self.points == QUARTERS { UNSEEN_SLOPE * (a * u + b * v) / self.points as f64 } else { 0.0 };
         bend.max(slope)
     }
 

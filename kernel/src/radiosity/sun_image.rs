@@ -19,7 +19,7 @@ const IMAGES_ROOM_LEAST: usize = 1 << 14;
 /// Room for images of the sun, for each side of a facet.
 const IMAGES_ROOM_PER_SIDE: usize = 2;
 
-/// The most images of one side: each is looked for from every point.
+/// Most images of the sun of one side: each is looked for from every point.
 const SIDE_IMAGES_MOST: usize = 1024;
 
 /// Images for which `sides` sides of facets have room.
@@ -27,7 +27,7 @@ fn room(sides: usize) -> usize {
     sides.saturating_mul(IMAGES_ROOM_PER_SIDE).max(IMAGES_ROOM_LEAST)
 }
 
-/// Places of one image: its direction; where the list goes on, and its [`Region`]; its [`Mirrors`].
+/// Number of places of one image: its direction; where the list goes on, and its [`Region`]; its [`Mirrors`].
 const IMAGE_PLACES: usize = 3;
 
 /// Places for the images of `sides` sides of facets: where each side's list begins, how many images there are, and the
@@ -71,7 +71,7 @@ impl Mirrors {
     }
 }
 
-/// Where a side's list would begin: it has too many images.
+/// In place of where a side's list begins: it has too many images.
 const SIDE_IMAGES_TOO_MANY: u64 = u64::MAX;
 
 /// The places of one side's list from its beginning, which holds the number of an image, counted from 1; 0: no more.
@@ -171,12 +171,12 @@ fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
     sqrt((a - c) * (a - c) + (b - d) * (b - d))
 }
 
-/// Suns this close to each other (1 - cosine; 1.4e-7 rad) are one: directions are kept to 2e-9.
+/// Least distance of two suns (1 - cosine; 1.4e-7 rad) at which they are told apart: directions are kept to 2e-9 rad.
 pub const SUN_DISTANCE_LEAST: f64 = 1e-14;
 
-/// Directions of one image by way of different facets are this close together (1 - cosine): some roundings of 2e-9 rad
+/// Largest distance (1 - cosine) of the directions of one image by way of different facets: some roundings of 2e-9 rad
 /// beyond [`SUN_DISTANCE_LEAST`].
-const SEEN: f64 = 2.0 * SUN_DISTANCE_LEAST;
+const SEEN_DISTANCE_MOST: f64 = 2.0 * SUN_DISTANCE_LEAST;
 
 /// Longest distance between two points of a scene, at most, in scene coordinates.
 const SCENE_DIAMETER: f64 = 4.0;
@@ -187,7 +187,7 @@ const IMAGE_DIRECTION_BITS: u32 = 31;
 /// The largest coordinate.
 const LAST_STEP: u64 = (1 << IMAGE_DIRECTION_BITS) - 1;
 
-/// Directions within [`SEEN`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
+/// Directions within [`SEEN_DISTANCE_MOST`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
 const NEAR_STEPS: i64 = 512;
 
 /// A direction in 63 bits, to 2e-9 rad; never 0.
@@ -245,7 +245,7 @@ impl Iterator for Nearby<'_> {
     }
 }
 
-/// The same while light is noted.
+/// The images of [`SunImages`] while beams are added to them.
 #[derive(Debug, Default)]
 pub struct SunImagesMut<'a> {
     /// As [`SunImages::slots`]; all 0 to begin with.
@@ -288,7 +288,8 @@ pub fn variance(spread: &[f32], known: bool) -> f64 {
     sum * sum * (1.0 / share - 1.0 + 1.0 / (count * sqrt(count)))
 }
 
-/// Rays that all fall on one place of an element: they are said to fill one over so many of them.
+/// Inverse of the least share of an element that an image of the sun is taken to fill, where all its rays fall on one
+/// place.
 const IMAGE_SHARE_LEAST: f64 = 16.0;
 
 impl SunImagesMut<'_> {
@@ -358,7 +359,7 @@ impl SunImagesMut<'_> {
 }
 
 impl<'a> SunImages<'a> {
-    /// Images for which a mesh of so many sides of facets has room, and means for so many unknowns.
+    /// The images of a mesh with `sides` sides of facets, and the means of `unknowns` unknowns.
     ///
     /// # Errors
     /// [`Error::Length`] for slices of other lengths; both may be empty where nothing throws sunlight.
@@ -420,7 +421,7 @@ impl<'a> SunImages<'a> {
             rim || (a - near[0]).abs() < NEAR_STEPS && (b - near[1]).abs() < NEAR_STEPS
         };
         let mut list = List::of(self.slots, sides, side);
-        list.any(|(packed, ..)| may_be(packed) && 1.0 - unpack(packed).dot(axis) < SEEN)
+        list.any(|(packed, ..)| may_be(packed) && 1.0 - unpack(packed).dot(axis) < SEEN_DISTANCE_MOST)
     }
 
     /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.

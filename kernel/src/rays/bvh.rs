@@ -221,8 +221,8 @@ impl<'m> Bvh<'m> {
         })
     }
 
-    /// The same with a tracer of the caller's in place of the walk through the tree; `corners` are the mesh's. Where
-    /// an answer names a facet that the ray does not meet, the tree is asked.
+    /// The tree with a tracer of the caller's in place of the walk through it; `corners` are the mesh's. Where an
+    /// answer names a facet that the ray does not meet, the tree is asked.
     pub fn with_intersector(self, tracer: Option<&'m dyn Intersector>, corners: &'m [[Vec3; 3]]) -> Bvh<'m> {
         Bvh { external: tracer.map(|tracer| External { tracer, corners }), ..self }
     }

@@ -39,19 +39,21 @@ type Balls = [[f32; WIDTH]; 4];
 /// Set in a facet's group where its body has a rim: both of its sides count, where both carry a material.
 const BOTH: u32 = 1 << 31;
 
-/// Where there are more edges, finding those that matter to a facet costs as much as some hundreds of rays.
+/// Most edges of a mesh that outlines are found for: with more, finding those of a facet costs as much as some hundreds
+/// of rays.
 const MESH_EDGES_MOST: usize = 1 << 16;
 
-/// The most facets of which edges are looked for: flat parts have fewer edges than facets.
+/// Most facets of a mesh whose edges are looked for: flat parts have fewer edges than facets.
 const MOST_FACETS: usize = 1 << 18;
 
-/// Edges of small meshes beyond two a facet.
+/// Edges of small meshes beyond two for each facet.
 const FEW_EDGES: usize = 64;
 
-/// Where memory is small there are none, and rays find what is open.
+/// Whether outlines are found: where memory is small, rays find what is open.
 const KEEPS_OUTLINES: bool = cfg!(feature = "std");
 
-/// Facets that rise less above a point's plane (scene coordinates) lie in it: some thousand roundings of a height.
+/// Height over a point's plane, in scene coordinates, up to which a facet lies in it: some thousand roundings of a
+/// height.
 const OUTLINE_HEIGHT_SLACK: f64 = 1e-12;
 
 plain_struct! {
@@ -78,7 +80,7 @@ impl<'m> Outlines<'m> {
     /// Without edges: nothing is known.
     pub const NONE: Outlines<'static> = Outlines { blocks: &[], balls: &[], groups: &[], edges: 0 };
 
-    /// Most edges of a mesh of so many facets: a closed one has one and a half a facet.
+    /// Most edges of a mesh of `facets` facets: a closed one has one and a half for each facet.
     fn most(facets: usize) -> usize {
         if !KEEPS_OUTLINES || facets > MOST_FACETS {
             0
@@ -87,7 +89,7 @@ impl<'m> Outlines<'m> {
         }
     }
 
-    /// Adds the memory of a mesh of so many facets, at most some 370 bytes each.
+    /// Adds the memory of a mesh of `facets` facets, at most some 370 bytes for each.
     pub fn need(need: Need, facets: usize) -> Need {
         let most = Outlines::most(facets);
         if most == 0 {
@@ -97,8 +99,8 @@ impl<'m> Outlines<'m> {
         edges::Build::need(need, facets, most).and::<Block>(most.div_ceil(WIDTH))
     }
 
-    /// Finds the edges of facets of these corners and areas, 0 where they are degenerate; none where there are so many that
-    /// rays cost less.
+    /// Finds the edges of facets of the given corners and areas (0 where they are degenerate). None are found where a
+    /// mesh has more than 65536.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`] below [`Outlines::need`].

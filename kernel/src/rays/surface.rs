@@ -8,14 +8,15 @@ use crate::rays::ray::{Hit, Ray};
 use crate::scene::lobe::Lobe;
 use crate::scene::{NO_MIRROR, Scene};
 
-/// Rays start this far off their facet (scene coordinates, in which the object fills [-1, 1]): some 256 times
-/// the rounding error of a point on a facet, and a tenth of the smallest gap that is told from contact.
+/// Height above their facet at which rays start, in scene coordinates (the object fills [-1, 1]): some 256 times the
+/// rounding error of a point on a facet, and a tenth of the smallest gap that is told from contact.
 pub const OFFSET: f64 = 1.0 / (1u64 << 44) as f64;
 
-/// Points whose least barycentric weight is below this may be on an edge.
+/// Least barycentric weight below which a point may be on an edge.
 const AT_EDGE: f64 = 1e-9;
 
-/// They go this far inward: as much farther than rays start above their facet as facets that meet at a degree need.
+/// Distance by which points on an edge are moved inward, in scene coordinates: as much farther than rays start above
+/// their facet as facets that meet at a degree need.
 const STEP_IN: f64 = 256.0 * OFFSET;
 
 /// True where nothing rises above the plane of a facet's side by as much as its rays start above it.

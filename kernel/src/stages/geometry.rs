@@ -74,7 +74,7 @@ pub trait BlockMemory: Send {
     fn keep(&mut self, bytes: usize);
 }
 
-/// The most records that a row is given room for while it grows.
+/// Most records that a row is given room for while it grows.
 const MOST_UNMERGED: usize = 1 << 28;
 
 impl CouplingRows<'_> {
@@ -160,7 +160,7 @@ pub fn places(rows: usize) -> usize {
     2 * rows.div_ceil(block_rows(rows)) + 8 + LANES_MOST.min(rows.div_ceil(LANE_ROWS))
 }
 
-/// The fewest rows of a lane where the rows in one piece of memory are split over several.
+/// Fewest rows of a lane where the rows in one piece of memory are split over several.
 const LANE_ROWS: usize = 16;
 
 /// Bytes in which rows may begin: those of one piece, while the last of them grows.

@@ -133,7 +133,7 @@ impl Sizes {
         })
     }
 
-    /// Bytes with which beams can begin on so many lanes; 0 where there are none.
+    /// Bytes with which beams can begin on `lanes` lanes; 0 where there are none.
     pub fn beams(&self, lanes: usize) -> usize {
         if self.beams == 0 { 0 } else { self.beams.saturating_mul(4 * lanes.max(1) - 3) + ALIGNMENT }
     }

@@ -50,10 +50,10 @@ pub struct CameraInput {
     pub sampling: Sampling,
 }
 
-/// A facet is near where the square of its distance is below so many of that of its size.
+/// Largest ratio of the squared distance of a facet to its squared size at which it counts as near.
 const NEAR_DISTANCE2: f64 = 4.0;
 
-/// The most pixels along either side of an image.
+/// Most pixels along either side of an image.
 pub const MAX_RESOLUTION: usize = 1 << 16;
 
 /// A validated camera, in scene coordinates.

@@ -41,7 +41,7 @@ pub struct ChainSettings {
     /// Where an error above this many of the images' is expected of an element, rays from the point itself find what arrives
     /// there.
     pub gather: f64,
-    /// Where mending all pixels is expected to take at most so many rays, all are.
+    /// Rays that final gathering may take for one image: where all pixels are expected to take fewer, all gather.
     pub rays: u64,
     /// Area of a pixel.
     pub pixel: PixelArea,
@@ -68,27 +68,28 @@ impl PixelArea {
     }
 }
 
-/// Lobes of this axis ratio and above are narrow: cells of a signature may miss their highlights.
-pub const APART: f64 = 10.0;
+/// Axis ratio from which on a lobe is narrow: cells of a signature may miss its highlights.
+pub const NARROW_LOBE_RATIO: f64 = 10.0;
 
-/// [`ChainSettings::gather`] where all pixels of an image may take rays and the solution is coarser than the image.
+/// [`ChainSettings::gather`] where all pixels of an image may gather and the solution is coarser than the image.
 const GATHER_ALL: f64 = 0.3;
 
-/// The same where the solution is as fine as the image.
+/// [`ChainSettings::gather`] where all pixels of an image may gather and the solution is as fine as the image.
 const GATHER_MANY: f64 = 0.6;
 
-/// Rays that an image may take in any case: some tenths of a second.
-const AT_LEAST: f64 = 2e6;
+/// Rays of final gathering that an image may take in any case: some tenths of a second.
+const IMAGE_RAYS_LEAST: f64 = 2e6;
 
 impl ChainSettings {
-    /// The same for the images of a camera: where the rays suffice for all pixels that the object may fill, all but the best
-    /// elements are mended. `reflected` is [`crate::radiosity::solution::Numbers::reflected`].
+    /// Settings for the images of a camera: where the rays suffice for all pixels that the object may fill, final
+    /// gathering is used on all but the best elements. `reflected` is
+    /// [`crate::radiosity::solution::Numbers::reflected`].
     pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>, reflected: f64) -> ChainSettings {
         let ErrorBudget { solution, image, .. } = self.budget;
         let all = camera.columns() * camera.rows();
         let spread = scene.largest_diffuse() * gather::spread(reflected);
         let each = gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::GATHER_RAYS_FEWEST);
-        let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(AT_LEAST);
+        let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(IMAGE_RAYS_LEAST);
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
         let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
@@ -106,7 +107,7 @@ impl ChainSettings {
         ChainSettings { gather, pixel, ..self }
     }
 
-    /// The same for sums over so many rays that errors of single elements count little.
+    /// Settings for sums over many rays, in which errors of single elements count little: no final gathering.
     pub(crate) fn of_sums(self) -> ChainSettings {
         ChainSettings { gather: f64::INFINITY, apart: true, ..self }
     }
@@ -354,8 +355,8 @@ const LOBE_POWER: f64 = 0.6;
 /// Factor of the part of that error that lies between the rays and is told by none of them. See [`LOBE_ERROR`].
 const LOBE_BETWEEN: f64 = 0.09;
 
-/// Number of rays in a lobe's first set, times the wanted error over the lobe's reflectance: what lies between so many
-/// rays ([`LOBE_BETWEEN`]) is a small part of the wanted error.
+/// Number of rays in a lobe's first set, times the wanted error over the lobe's reflectance: what lies between the rays
+/// ([`LOBE_BETWEEN`]) is then a small part of the wanted error.
 const FIRST_RAYS: f64 = 0.24;
 
 /// Fewest rays of one lobe: their standard deviation decides on the rest.
@@ -426,7 +427,7 @@ impl Solved<'_> {
         self.radiance_at((ray, self.bvh.closest(ray)), sample, terms, &mut { ChainScratch::ZERO })
     }
 
-    /// The same of a ray that is known to meet `hit` first, in the caller's memory.
+    /// As [`Solved::radiance`], of a ray that is known to meet `hit` first, in the caller's memory.
     pub fn radiance_at(
         &self,
         seen: (&Ray, Option<Hit>),
@@ -437,7 +438,7 @@ impl Solved<'_> {
         self.radiance_with(seen, sample, terms, work, &mut OccluderCache::none())
     }
 
-    /// The same with what is known of what stands before facets: fewer rays, and the same bits.
+    /// As [`Solved::radiance_at`], with a cache of occluders: fewer rays, and the same bits.
     pub(crate) fn radiance_with(
         &self,
         (ray, hit): (&Ray, Option<Hit>),
@@ -517,7 +518,7 @@ impl Solved<'_> {
                     self.advance_mirror(state, &surface, mode, path)
                 }
                 Some(lobe) => {
-                    if !(apart && lobe.ratio() >= APART) {
+                    if !(apart && lobe.ratio() >= NARROW_LOBE_RATIO) {
                         self.add_sun_gloss(state, &surface, &mirror, mode, terms, path);
                     }
                     if !self.advance_lobe(state, &surface, &mirror, mode, path) {
@@ -888,7 +889,7 @@ struct Arriving<'g> {
     variance: f64,
 }
 
-/// Sets of signs of the errors of elements; all have the same sign in the last.
+/// Number of sets of signs of the elements' errors; in the last, all have one sign.
 pub(crate) const SIGNS: usize = 5;
 
 /// The sign of an unknown's error in one of the sets: errors of different elements are independent, so that squares of sums

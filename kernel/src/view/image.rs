@@ -34,7 +34,7 @@ pub struct Tally {
     pub refined: u64,
     /// Sum over object pixels of the squared expected error from the diffuse solution.
     pub noise2: f64,
-    /// The same of the error from sampling the pixel's area.
+    /// Sum over object pixels of the squared expected error from sampling the pixel's area.
     pub sampling2: f64,
     /// Largest bound on what cut chains could still have brought.
     pub tail: f64,
@@ -78,22 +78,22 @@ pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
     let width = camera.columns() + 2;
     let need = Need::new().and::<f64>(Centres::size(camera.columns(), bands)).and::<f64>(work(bands));
     let need = need.and::<PixelScratch>(1).and::<Occluders>(OccluderCache::ROOM);
-    Candidates::need(Items::need(need, width, DRAWN), CANDIDATE_FACETS_KEPT).bytes()
+    Candidates::need(Items::need(need, width, ROWS_DRAWN), CANDIDATE_FACETS_KEPT).bytes()
 }
 
-/// Rows of one piece of an image of so many, for who shares them out: few enough to balance, enough to be drawn together;
-/// the same for any number of threads, so that sums over pixels are the same too.
+/// Rows of one piece of an image of `rows` rows: few enough to balance threads, enough to be drawn together. It does
+/// not depend on the number of threads, so that sums over pixels do not either.
 pub fn piece(rows: usize) -> usize {
-    rows.div_ceil(128).max(DRAWN)
+    rows.div_ceil(128).max(ROWS_DRAWN)
 }
 
-/// Facets about which much stands whose outlines are remembered.
+/// Number of facets whose outlines are kept, of those that many others stand about.
 const CANDIDATE_FACETS_KEPT: usize = 8;
 
-/// Rows that are drawn together.
-const DRAWN: usize = 8;
+/// Number of rows that are drawn together.
+const ROWS_DRAWN: usize = 8;
 
-/// Meshes of more facets than so many times the pixels are not drawn: rays cost less.
+/// Most facets of a mesh that is drawn into the item buffer, for each pixel: rays cost less beyond.
 const DRAWN_FACETS_PER_PIXEL: usize = 2;
 
 /// Values of two nested integrals and the result.
@@ -107,33 +107,33 @@ const SCATTER_RAYS_FEWEST: u32 = 8;
 /// Most scattered rays through a pixel: a bound on the time of one pixel.
 const SCATTER_RAYS_MOST: u32 = 1024;
 
-/// Error of the mean of n scattered rays of the standard deviation s over s n^-3/4: 0.8 to 1.2 in penumbrae, lobes and
-/// at edges for 4 to 256 rays.
-const SCATTERED: f64 = 1.2;
+/// Error of the mean of n scattered rays of the standard deviation s, over s n^-3/4: measured as 0.8 to 1.2 in
+/// penumbrae, lobes and at edges for 4 to 256 rays (`cargo run --release --example calibrate`).
+const SCATTER_ERROR_FACTOR: f64 = 1.2;
 
-/// Error of integrals along lines over that of the jumps that they have left: what lies between lines is not among it.
+/// Factor on the error that integrals along lines tell: they do not see what lies between lines.
 const LINE_ERROR_FACTOR: f64 = 1.5;
 
-/// Share of the contrast with neighbours that rays which have not seen it may miss.
+/// Share of the contrast with the neighbours that scattered rays may have missed where none of them shows it.
 const PIXEL_UNSEEN_SHARE: f64 = 0.35;
 
-/// Share of the contrast with a neighbour that counts as curvature: where radiance changes fast, detail between the pixels'
+/// Share of the contrast with a neighbour that counts as curvature: where radiance changes fast, detail between pixel
 /// centres is likelier.
-const STEEP: f64 = 0.25;
+const CONTRAST_CURVATURE: f64 = 0.25;
 
 /// Parts into which first lines divide a pixel, and first places a line.
 ///
 /// Places are shifted from line to line. What reaches less far into a pixel than a part, and ends there, is missed.
 const PIXEL_PARTS: usize = 4;
 
-/// The same parts for wanted errors below [`FINE_PIXELS`].
+/// Parts of a pixel, as [`PIXEL_PARTS`], for wanted errors below [`FINE_PIXELS`].
 const PIXEL_PARTS_FINE: usize = 8;
 
 /// Wanted error of an image, relative to the reference radiance, below which pixels are divided into more parts.
 const FINE_PIXELS: f64 = 1e-3;
 
-/// Scattered rays cost less than lines where the changes in the neighbourhood, in both directions and over three rows,
-/// are up to so many times the error wanted.
+/// Largest contrast in a pixel's neighbourhood, in wanted errors, for which scattered rays cost less than lines: the
+/// changes in both directions, over three rows.
 const SCATTER_CONTRAST_MOST: f64 = 60.0;
 
 /// Narrowest distance of two lines, in pixels.
@@ -142,12 +142,12 @@ const LINES_NARROWEST: f64 = 1.0 / 64.0;
 /// Narrowest distance of two places along a line, in pixels.
 const PLACES_NARROWEST: f64 = 1.0 / 4096.0;
 
-/// Lines of a pixel that has cost so many rays are not halved.
-const ENOUGH: u64 = 2048;
+/// Rays of a pixel after which its lines are not halved any more.
+const PIXEL_RAYS_ENOUGH: u64 = 2048;
 
-/// Places along lines shift by this from line to line: its multiples by the powers of two up to 16, between which
+/// Shift of the places along a line per distance of lines: its multiples by the powers of two up to 16, between which
 /// lines are halved, fill the unit interval evenly (16 times it is the golden ratio).
-const SHIFT: f64 = 64.0 * 0.101_127_124_296_868_43;
+const PLACE_SHIFT: f64 = 64.0 * 0.101_127_124_296_868_43;
 
 /// Computes the pixels of the rows in `range`. Any split into ranges gives the same bits.
 ///
@@ -195,10 +195,10 @@ fn check(target: &Target<'_>, expected: usize) -> Result<(), Error> {
     Ok(())
 }
 
-/// Rays toward the sun of a pixel, some more or less.
+/// Rays toward the sun that follow a pixel's ray, on the mean.
 const SUN_RAYS: f64 = 8.0;
 
-/// How far from a pixel's edges its rays stay, in pixels.
+/// Distance of a pixel's rays from its edges, in pixels: a ray on the very edge may see what lies beyond it.
 const PIXEL_MARGIN: f64 = 1e-6;
 
 plain_table! {
@@ -234,7 +234,7 @@ impl Primary<'_> {
     /// Makes the item buffer hold a row.
     fn draw(&mut self, solved: &Solved<'_>, camera: &Camera, row: isize) {
         if self.draws && !self.drawn.contains(&row) {
-            self.drawn = row..self.last.min(row + DRAWN as isize).max(row + 1);
+            self.drawn = row..self.last.min(row + ROWS_DRAWN as isize).max(row + 1);
             self.items.draw(solved.bvh, &camera.samples(), self.drawn.clone(), -1);
         }
     }
@@ -277,7 +277,7 @@ impl<'a, 's> Painter<'a, 's> {
         let pixel = pixel.ok_or(Error::BufferTooSmall { needed: 1, given: 0 })?;
         pixel.work.gathered.start();
         let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
-        let items = Items::new(&mut arena, camera.columns() + 2, DRAWN)?;
+        let items = Items::new(&mut arena, camera.columns() + 2, ROWS_DRAWN)?;
         let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
         let own = solved.bvh.is_own();
         let few = solved.scene.facets() / DRAWN_FACETS_PER_PIXEL <= camera.columns() * camera.rows();
@@ -539,7 +539,7 @@ impl<'a, 's> Painter<'a, 's> {
         for (i, j) in [(0, 1), (1, 0), (1, 1), (1, -1)] {
             let [before, here, after] = [centre(-i, -j), centre(0, 0), centre(i, j)];
             let contrast = measure.step(before, here).max(measure.step(here, after));
-            largest = largest.max(measure.bend(before, here, after)).max(STEEP * contrast);
+            largest = largest.max(measure.bend(before, here, after)).max(CONTRAST_CURVATURE * contrast);
         }
         largest
     }
@@ -623,11 +623,11 @@ impl<'a, 's> Painter<'a, 's> {
         let goal = 0.7 * goal;
         let parts = if solved.settings.budget.image < FINE_PIXELS { PIXEL_PARTS_FINE } else { PIXEL_PARTS };
         let mut line = |y: f64, out: &mut [f64]| {
-            let shift = turn + SHIFT * y;
+            let shift = turn + PLACE_SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;
             let mut places = [0.0; PIXEL_PARTS_FINE + 1];
             let places = evenly(&mut places, parts, shift);
-            let narrowest = if tally.primary - before > ENOUGH { 1.0 } else { PLACES_NARROWEST };
+            let narrowest = if tally.primary - before > PIXEL_RAYS_ENOUGH { 1.0 } else { PLACES_NARROWEST };
             integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
                 // a ray on the very edge may see what lies beyond it
                 let [x, y] = [x, y].map(|x| clamp(x, PIXEL_MARGIN, 1.0 - PIXEL_MARGIN));
@@ -685,7 +685,7 @@ impl<'a, 's> Painter<'a, 's> {
                 let share = 1.0 / f64::from(n);
                 // what n rays have not seen of the neighbours' contrast lies in some 1/sqrt(n) of the pixel
                 let spread = self.spread(share).max(PIXEL_UNSEEN_SHARE * contrast * sqrt(share));
-                error = (SCATTERED * spread * pow(share, 0.75)).max(glare * share);
+                error = (SCATTER_ERROR_FACTOR * spread * pow(share, 0.75)).max(glare * share);
                 if error > wanted && goal < SCATTER_RAYS_MOST {
                     goal *= 2;
                 }
@@ -730,7 +730,7 @@ impl<'a, 's> Painter<'a, 's> {
     }
 }
 
-/// The ends of so many equal parts of the unit interval, those within it shifted.
+/// Ends of `parts` equal parts of the unit interval, those within it shifted.
 #[inline]
 fn evenly(places: &mut [f64; PIXEL_PARTS_FINE + 1], parts: usize, shift: f64) -> &[f64] {
     let places = places.head_mut(parts + 1);

@@ -18,10 +18,10 @@ use crate::rays::bvh::{Bvh, HalfSpace};
 use crate::rays::ray::Ray;
 use core::ops::Range;
 
-/// Nothing is met.
+/// In place of a facet: nothing is met.
 pub const NO_FACET_DRAWN: u32 = u32::MAX;
 
-/// The drawing cannot tell: trace a ray.
+/// In place of a facet: drawing cannot tell what is met, and a ray does.
 pub const UNSURE: u32 = u32::MAX - 1;
 
 /// Rays of a grid: parallel, or through the eye.
@@ -106,13 +106,13 @@ impl Margin {
 }
 
 impl<'m> Items<'m> {
-    /// Adds what a buffer of so many samples takes.
+    /// Adds the memory of a buffer of `columns` times `rows` samples.
     pub const fn need(need: Need, columns: usize, rows: usize) -> Need {
         let size = columns.saturating_mul(rows);
         need.and::<f64>(size).and::<f64>(size).and::<u32>(size)
     }
 
-    /// Takes a buffer for so many samples from the arena.
+    /// Takes a buffer of `columns` times `rows` samples from the arena.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`] where the arena has less than [`Items::need`].
@@ -229,7 +229,7 @@ impl<'m> Items<'m> {
 /// distance from the eye; depths closer than this part of it are not told apart.
 const RASTER_DEPTH_ROUNDING: f64 = 1.0 / (1u64 << 34) as f64;
 
-/// Facets seen at a smaller cosine are left to rays.
+/// Least cosine of facets that are drawn; others are left to rays.
 const RASTER_COSINE_GRAZING: f64 = 1.0 / (1u32 << 9) as f64;
 
 /// Rounding of a corner's place on the grid, per unit of what it is computed from: a dozen operations.
@@ -451,7 +451,7 @@ impl Triangle {
     }
 }
 
-/// Far above the rounding of places up to 2^17, far below 1.
+/// Slack of places on the grid: far above the rounding of places up to 2^17, far below 1.
 const ROUNDED: f64 = 1.0 / (1u64 << 30) as f64;
 
 /// Whole numbers from `low` to `high` among `range`.

@@ -29,7 +29,7 @@ pub struct View {
     glints: usize,
 }
 
-/// The golden ratio less 1: rows of cells are shifted by its multiples, which fill a cell evenly.
+/// Shift of the cells from row to row, in cells: the golden ratio less 1, whose multiples fill a cell evenly.
 const CELL_ROW_SHIFT: f64 = 0.618_033_988_749_894_9;
 
 impl View {
@@ -83,7 +83,7 @@ plain_table! {
         pub area: f64,
         /// Radiant intensity in W/sr, one value per band.
         pub intensity: [f64; MAX_BANDS],
-        /// The same by every fourth row of cells, and how many rows these are.
+        /// The intensity by every fourth row of cells.
         pub parts: [[f64; MAX_BANDS]; SIGNATURE_SETS],
         /// Rows of each part.
         pub counts: [f64; SIGNATURE_SETS],
@@ -92,14 +92,14 @@ plain_table! {
         /// Sum over the projected area of the errors expected of the diffuse solution, of lobes and of chains that were cut,
         /// relative to the reference radiance.
         pub alike: f64,
-        /// The same of [`Path::chance`].
+        /// Sum of [`Path::chance`], weighed as the radiances.
         pub chance: f64,
         /// Rays traced.
         pub rays: u64,
     }
 }
 
-/// Parts of a signature whose differences tell its error: every fourth row.
+/// Number of sets of rows whose differences tell a signature's error: every fourth row each.
 const SIGNATURE_SETS: usize = 4;
 
 impl Sums {
@@ -164,14 +164,14 @@ impl Sums {
     }
 }
 
-/// Rows that are looked at together; small machines have little memory.
+/// Number of rows that are drawn together; small machines have little memory.
 const SIGNATURE_ROWS_TOGETHER: usize = if cfg!(feature = "std") { 8 } else { 1 };
 
-/// Meshes of more facets than so many times the cells are sampled: rays cost less than all facets' ends.
+/// Most facets of a mesh whose ends are found for each cell: rays cost less beyond.
 const DRAWN_FACETS_PER_CELL: usize = 2;
 
-/// Facets less far apart on a row, in cells, touch.
-const GAP: f64 = 1e-9;
+/// Largest gap between facets on a row, in cells, at which they touch.
+const SPAN_GAP: f64 = 1e-9;
 
 /// Bytes of scratch memory for [`rows`] and [`whole`].
 pub fn scratch_bytes() -> Result<usize, Error> {
@@ -309,7 +309,7 @@ impl Tracer<'_> {
             let mut end = first.end;
             next = spans.next();
             while let Some(span) = next
-                && span.start <= end + GAP
+                && span.start <= end + SPAN_GAP
             {
                 end = span.end;
                 next = spans.next();
@@ -361,7 +361,7 @@ impl Tracer<'_> {
         path
     }
 
-    /// Adds what was found last for so many cells.
+    /// Adds the latest terms for `cells` cells.
     #[inline]
     fn add(&self, cells: f64, path: &Path, sums: &mut Sums) {
         let area = cells * self.area;
@@ -396,11 +396,13 @@ pub struct Signature {
     pub unresolved: f64,
 }
 
-/// Error of a signature's rows over what its parts differ by: four times as many rows are more than twice as even.
-const UNEVEN: f64 = 1.05;
+/// Factor on the error of a signature's rows that the differences between its sets tell: four times as many rows are
+/// more than twice as even.
+const CELL_ROWS_ERROR_FACTOR: f64 = 1.05;
 
-/// The same of errors of elements, lobes and chains, of which those of different places do not all add up.
-const ALIKE: f64 = 0.5;
+/// Share of the errors of elements, lobes and chains that adds up over a view: those of different places are partly
+/// independent.
+const ERRORS_ALIKE_SHARE: f64 = 0.5;
 
 impl Signature {
     /// The signature in `band`, of which `reference` is the reference radiance, against a background radiance.
@@ -408,7 +410,8 @@ impl Signature {
         let intensity = sums.intensity.at(band);
         let mean_radiance = if sums.area > 0.0 { intensity / sums.area } else { 0.0 };
         let contrast = (background > 0.0).then(|| (mean_radiance - background) / background);
-        let (rows, alike) = (UNEVEN * sums.unevenness(band), ALIKE * reference * sums.alike);
+        let (rows, alike) =
+            (CELL_ROWS_ERROR_FACTOR * sums.unevenness(band), ERRORS_ALIKE_SHARE * reference * sums.alike);
         let error = sqrt(rows * rows + sums.doubt2.at(band) + alike * alike);
         Signature { intensity, mean_radiance, contrast, error, unresolved: reference * sums.chance }
     }

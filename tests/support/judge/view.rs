@@ -102,7 +102,7 @@ impl Judge<'_> {
         self.image_of(camera, |_| true, goal, most_rays, seed)
     }
 
-    /// The same of the pixels that `taken` picks alone: the others count as if they met nothing.
+    /// As above, of the pixels that `taken` picks alone: the others count as if they met nothing.
     pub fn image_of(
         &self,
         camera: &CameraInput,

@@ -13,7 +13,7 @@ use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
 use crate::rays::bvh::Bvh;
 use crate::scene::Scene;
 
-/// The most edges that are looked at for one facet: where more may be outlines, rays cost less.
+/// Most edges that are examined for one facet: where more may be outlines, rays cost less.
 const OUTLINE_EDGES_MOST: usize = 1024;
 
 /// Most blocks of edges of one facet.
@@ -22,19 +22,19 @@ const CANDIDATE_BLOCKS: usize = if KEEPS_OUTLINES { OUTLINE_EDGES_MOST / WIDTH }
 /// Most facets over the pole of one facet.
 const POLES: usize = if KEEPS_OUTLINES { 512 } else { 0 };
 
-/// Lists that are kept for each facet that would need all of that.
+/// Number of lists that are kept for facets that need the largest.
 const LISTS: usize = if KEEPS_OUTLINES { 32 } else { 0 };
 
-/// Room for crossings.
+/// Number of crossings of outlines with the horizon for which there is room.
 const CROSSINGS: usize = if KEEPS_OUTLINES { 2 * OUTLINE_EDGES_MOST + 16 * WIDTH } else { 0 };
 
-/// In place of a count: too many.
+/// In place of a count of edges: too many, and rays decide.
 const EDGES_TOO_MANY: u32 = u32::MAX;
 
-/// Heights of planes above a corner (scene coordinates) whose sign is in doubt.
+/// Largest height of a plane above a corner, in scene coordinates, whose sign may be rounding.
 const PLANE_HEIGHT_ROUNDING: f64 = 1e-13;
 
-/// Rows of an active edge: both ends in the frame of the point, and its jumps of all and of counted facets.
+/// Number of rows of an active edge: both ends in the frame of the point, and its jumps of all and of counted facets.
 pub(super) const ACTIVE: usize = 8;
 
 /// Edges that are outlines from a point, lane by lane.
@@ -85,13 +85,13 @@ plain_struct! {
     pub struct List {
         /// Twice the facet and the side, and one; 0: nothing.
         pub side: u32,
-        /// Where its edges start, in blocks, and how many there are; or [`EDGES_TOO_MANY`].
+        /// Where its edges start, in blocks.
         pub blocks: u32,
-        /// See there.
+        /// How many edges it has; or [`EDGES_TOO_MANY`].
         pub edges: u32,
-        /// The same of facets over the pole.
+        /// Where the facets over its pole start.
         pub poles: u32,
-        /// See there.
+        /// How many facets are over its pole.
         pub over: u32,
     }
 }
@@ -312,7 +312,7 @@ impl<'m> Candidates<'m> {
     }
 }
 
-/// Open share that is rounding of the contour's sum: nothing is open.
+/// Open share up to which the contour's sum is rounding: nothing is open.
 const OPEN_SHARE_ROUNDING: f64 = 1e-6;
 
 /// Open shares and heights within what is possible: a share is at most the whole one, and heights are at most shares on

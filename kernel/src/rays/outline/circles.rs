@@ -11,13 +11,13 @@ use crate::base::qmc::hash2;
 use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
 use crate::base::sort::sort;
 
-/// Half circles of a set.
+/// Number of half circles of a set.
 const HALVES: usize = 2 * WIDTH;
 
-/// Parts of the half circles, whose difference tells the error.
+/// Number of parts of the half circles; the differences between them tell the error.
 const CIRCLE_SETS: usize = 4;
 
-/// Error of the mean over that of independent parts: they fill one another's gaps.
+/// Error of the mean of the parts over that of independent ones: they fill one another's gaps.
 const CIRCLE_SETS_CORRELATION: f64 = 0.6;
 
 /// Least relative error of the overlap that one set of circles finds, of outlines that cross at random.
@@ -28,13 +28,13 @@ const CIRCLES_ERROR_POWER: f64 = 1.7;
 
 /// Error of one set where half circles meet more than [`SIMPLE_OUTLINES_MOST`] outlines, or outlines of several bodies, and
 /// none covers another: an overlap may lie between circles. It falls with the square of the number of sets.
-const MISSED: f64 = 4e-3;
+const MISSED_OVERLAP: f64 = 4e-3;
 
 /// Most outlines on a half circle for which no overlap can lie between circles.
 const SIMPLE_OUTLINES_MOST: usize = 2;
 
-/// The most sets.
-const MOST_SETS: u32 = 16;
+/// Most sets of half circles at one point.
+const SETS_MOST: u32 = 16;
 
 /// What circles tell.
 pub(super) struct Found {
@@ -50,10 +50,12 @@ pub(super) struct Found {
 /// Sums over half circles, of both that [`Found`] tells of.
 type Sums = [[f64; 4]; 2];
 
-/// Difference of the two independent answers (open shares and heights), beyond their errors, from which on one of them is
-/// taken to be wrong and rays decide. It is far above what circles leave: stairs and nested boxes under an overcast sky have
-/// some such points in a thousand.
-const CONTRADICTION: f64 = 0.02;
+/// Largest difference of the two independent answers (open shares and heights), beyond their errors, at which both are
+/// trusted. Above it one of them is wrong, and rays decide.
+///
+/// It is far above what circles leave: stairs and nested boxes under an overcast sky have some such points in a
+/// thousand.
+const ANSWERS_DIFFERENCE_MOST: f64 = 0.02;
 
 /// Looks along as many circles as it takes for an error of `goal`. `None` where more crossings are met than there is room
 /// for, or where what is open along circles contradicts the contours, `contour` without what covers them. `one`: all
@@ -98,7 +100,8 @@ pub(super) fn look(
         let means = sums.map(|sums| sums[0] / lines);
         // lines that agree by chance do not end it
         let amounts = [means[0].abs(), means[1].min(1.0 - means[1])];
-        let missed = if most > SIMPLE_OUTLINES_MOST || !one { MISSED / f64::from(sets * sets) } else { 0.0 };
+        let missed =
+            if most > SIMPLE_OUTLINES_MOST || !one { MISSED_OVERLAP / f64::from(sets * sets) } else { 0.0 };
         let least = |k: usize| {
             (CIRCLES_ERROR_LEAST * amounts.at(k) * pow(f64::from(sets), -CIRCLES_ERROR_POWER)).max(missed)
         };
@@ -106,13 +109,13 @@ pub(super) fn look(
         let errors = [error(0), error(1)];
         let is_open = errors[1] < errors[0];
         let error = errors[usize::from(is_open)];
-        let most = CONTRADICTION + 4.0 * (errors[0] + errors[1]);
+        let most = ANSWERS_DIFFERENCE_MOST + 4.0 * (errors[0] + errors[1]);
         let sign = if frame.above { 1.0 } else { -1.0 };
         let apart = |k: usize, sign: f64| (contour[k] + sign * (sums[0][k] - sums[1][k]) / lines).abs();
         if [apart(0, 1.0), apart(1, sign), apart(2, 1.0), apart(3, sign)].iter().any(|apart| *apart > most) {
             return None;
         }
-        if error <= goal || sets >= MOST_SETS {
+        if error <= goal || sets >= SETS_MOST {
             let [whole, high, near, near_high] = sums[usize::from(is_open)].map(|sum| sum / lines);
             return Some(Found { values: [whole, sign * high, near, sign * near_high], is_open, error });
         }
@@ -121,7 +124,8 @@ pub(super) fn look(
     }
 }
 
-/// Expected error of the mean of so many lines, by the sums of parts of them that are spread alike.
+/// Expected error of the mean of `lines` lines, from the differences between the sums of its parts, which are spread
+/// alike.
 fn spread(parts: &[f64; CIRCLE_SETS], lines: f64) -> f64 {
     let mean = parts.iter().sum::<f64>() / CIRCLE_SETS as f64;
     let square =

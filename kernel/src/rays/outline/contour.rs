@@ -225,7 +225,8 @@ impl<F: Wide> Arc<F> {
         self.signed(lanes, wide_angle(lanes, sine, cosine) * z.abs() / sine.max(least))
     }
 
-    /// The same of a radiance as high as the direction: `x`, `z` point to the zenith; 2/3 of it apart.
+    /// As the open irradiance of an arc, of a radiance that rises as the height of the direction: `x`, `z` point to the
+    /// zenith; a factor of 2/3 is left out.
     #[inline(always)]
     fn lifted<L: Lanes64<F = F>>(self, lanes: L, (x, z): (F, F)) -> F {
         let (one, least) = (lanes.all(1.0), lanes.all(1e-30));

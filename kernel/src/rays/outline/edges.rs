@@ -15,7 +15,7 @@ const COPLANAR_SINE: f64 = 4e-6;
 /// Largest distance of facets of one plane from it, in scene coordinates.
 const COPLANAR_DISTANCE: f64 = 1e-7;
 
-/// The most facets in one edge that are paired; where more meet, each has the edge for itself.
+/// Most facets at one edge that are paired; where more meet, each has the edge for itself.
 const MOST_PAIRED: usize = 16;
 
 /// No second facet.

@@ -62,10 +62,10 @@ struct Sums {
     all: f64,
 }
 
-/// Lanes: sums are those of so many interleaved parts, whatever the instruction set.
+/// Lanes: sums are those of this many interleaved parts, whatever the instruction set.
 const N: usize = 8;
 
-/// Chunks of so many directions that are added up in f32, beyond in f64.
+/// Chunks of directions that are added up in f32; beyond, sums are f64.
 const CHUNKS: usize = 16;
 
 /// Sums of the heights of packed directions over the horizon of `up`: in f32, good to 1e-6, as the directions are no

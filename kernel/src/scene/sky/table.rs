@@ -53,7 +53,7 @@ pub(in crate::scene) struct SpotSun<'a> {
 /// Half the width of the window about a bright sample, in radians: a blurred sun and its glow.
 const WINDOW: f64 = 0.05;
 
-/// The brightest sample of a sun is so many times what stands about its window.
+/// Least ratio of a sun's brightest sample to what stands about its window.
 const BRIGHT: f64 = 20.0;
 
 /// One elevation of the quadrature: the plane's cosine there is `constant + swing cos(azimuth - normal's)`,

@@ -74,7 +74,7 @@ impl Solved<'_> {
             && self.finds_small_facets(&near(element > CROWDED_PIXELS_LEAST * pixel), &[surface.point; 3])
     }
 
-    /// The same of any of its points, or because there are too many facets to tell.
+    /// Whether small facets stand near any point of an element, or too many facets to tell.
     #[inline]
     fn element_has_fine_detail(&self, unknown: usize, near: &Near, known: &mut DetailCache) -> bool {
         let (place, name) = (unknown % DETAIL_ELEMENTS_KEPT.max(1), 2 * (unknown as u64 + 1));

@@ -20,14 +20,16 @@ use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
 use crate::scene::MAX_BANDS;
 
-/// Where the stack and memory are small nothing is gathered.
+/// Whether final gathering is available: not where stack and memory are small.
 pub(crate) const GATHERS: bool = cfg!(feature = "std");
 
-/// Bands for which there is room.
+/// Number of bands for which final gathering has room.
 pub(super) const BANDS: usize = if GATHERS { MAX_BANDS } else { 0 };
 
-/// On the calibration's scenes the true error of elements is up to so many times what their rows' halves and quarters tell, in
-/// nineteen of twenty: a few may carry it. Estimates of images count it in.
+/// Factor on the expected error of elements in estimates of images: the 95 % quantile of the true error over what rows'
+/// halves and quarters tell. A few elements may carry an image's error.
+///
+/// Measured by `cargo run --release --example calibrate`.
 pub(crate) const CAUTION: f64 = 1.9;
 
 /// Fewest rays from a point whose straight sky is known: they find reflected light alone.
@@ -36,7 +38,7 @@ pub(super) const GATHER_RAYS_FEWEST: f64 = 32.0;
 /// Fewest rays from a point that find the sky, too: fewer may all miss a small bright part of it.
 const GATHER_SKY_RAYS_FEWEST: f64 = 128.0;
 
-/// Most rays from a point.
+/// Most rays from a point: its sequence has 2^16 points.
 const GATHER_RAYS_MOST: f64 = 65536.0;
 
 /// Fewest rays from a point, as a factor on [`usual_rays`] at the standard deviation that is expected there.
@@ -45,55 +47,64 @@ const GATHER_RAYS_FACTOR_LEAST: f64 = 0.25;
 /// Most rays from a point, as a factor on [`usual_rays`]: beyond, more rays bring less than finer elements would.
 const GATHER_RAYS_FACTOR_MOST: f64 = 4.0;
 
-/// Parts of them.
+/// Number of sets into which the rays from a point are divided; the differences between them tell the error of the
+/// mean.
 const GATHER_SETS: usize = 8;
 
-/// Error to reach, in tolerances.
-const GOAL: f64 = 0.55;
+/// Error that the rays from a point are to reach, in wanted errors of the image. Measured by `cargo run --release
+/// --example calibrate`.
+const GATHER_GOAL: f64 = 0.55;
 
-/// Rays from points find what lobes up to this axis ratio throw of the sun; what narrower ones throw, few of them see.
+/// Largest axis ratio of lobes in a scene in whose reflected sunlight points still gather: what narrower lobes reflect
+/// of the sun, few rays meet.
 const GATHER_LOBE_RATIO_MOST: f64 = 20.0;
 
-/// Square of the expected error of the mean of all rays over what it comes to: what is small and bright, or dark, few of them
-/// see.
+/// Factor on the squared error that the differences between the [`GATHER_SETS`] tell. They underestimate it where a
+/// small bright or dark object is met by few rays. Measured by `cargo run --release --example calibrate`.
 const GATHER_ERROR_FACTOR2: f64 = 2.4;
 
-/// Square of what the parts of the rays tell as if they were independent over that of the error of their mean, the root of
-/// [`GATHER_SETS`] where errors go with n^-3/4: each part fills what the others leave out. In stairs, fins and nested boxes of
-/// reflectance 0.5 to 0.8 it is 3.5.
-const STRATIFIED: f64 = 2.83;
+/// Variance of the mean that independent sets would have by their differences, over that of the stratified sets: the
+/// root of [`GATHER_SETS`] where errors go with n^-3/4.
+///
+/// Measured as 3.5 in stairs, fins and nested boxes of reflectance 0.5 to 0.8.
+const GATHER_STRATIFIED: f64 = 2.83;
 
-/// Rays go on diffusely from elements whose root of the area is more than this share of the ray.
+/// Largest ratio of the root of an element's area to the length of the ray that meets it, at which its linear function
+/// is used; above it the ray goes on diffusely.
 const ONWARD_SIZE_MOST: f64 = 1.0;
 
-/// The most times that a ray goes on: in a corner half of the light does each time.
+/// Most times that a ray goes on diffusely: in a corner half of the light does each time.
 const MOST_ONWARD: u32 = 8;
 
-/// Square of the error that what rays meet leaves in their mean over that of its expected errors, each of its own sign: a part
-/// of these is what linear functions leave out, which cancels within an element.
-const MIXED: f64 = 0.7;
+/// Squared error that the errors of the elements met leave in the mean of the rays, over the square of the mean of
+/// their expected errors with signs of their own. A part of each error is what a linear function leaves out, which
+/// cancels within an element. Measured by `cargo run --release --example calibrate`.
+const CARRIED_MIXED: f64 = 0.7;
 
-/// The same over the square of the mean of expected errors: linear functions over coarse elements leave out alike in a
-/// cavity. In nested boxes of 378 elements it is 0.7, in fins and stairs 0.2 to 0.4.
-const COHERENT: f64 = 0.4;
+/// Squared error that the errors of the elements met leave in the mean of the rays, over the square of the mean of
+/// their expected errors with one sign: linear functions over coarse elements leave out alike in a cavity.
+///
+/// Measured as 0.7 in nested boxes of 378 elements, 0.2 to 0.4 in fins and stairs.
+const CARRIED_COHERENT: f64 = 0.4;
 
-/// Elements of one pixel whose corrections are kept.
+/// Number of elements of one pixel whose corrections are kept.
 pub(super) const PIXEL_ELEMENTS_KEPT: usize = if GATHERS { 8 } else { 0 };
 
 plain_table! {
-    /// What rays from points have brought, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
+    /// Memory of final gathering, of any content; [`Gathered::start`] and [`Gathered::forget`] come first.
     pub struct Gathered {
-        /// Of the latest ray.
+        /// Terms of the latest ray.
         pub terms: [Terms; GATHERS as usize],
-        /// Product of the reflectances along it.
+        /// Product of the reflectances along the latest ray, one value per band.
         pub throughput: [[f64; MAX_BANDS]; GATHERS as usize],
-        /// The same from where it goes on diffusely.
+        /// Product of the reflectances from where it goes on diffusely.
         pub onward: [[f64; MAX_BANDS]; GATHERS as usize],
-        /// The sky in its direction.
+        /// Radiance of the sky in its direction.
         pub sky: [f64; BANDS],
-        /// Sums over the rays of each part: what they bring beyond the sky that they would see were nothing in their way.
+        /// Sums over the rays of each set: their radiance less that of the sky that they would see were nothing in
+        /// their way.
         pub beyond: [[f64; BANDS]; GATHER_SETS],
-        /// The same of that sky.
+        /// Sums over the rays of each set: radiance of the sky that they would see were nothing in their way.
         pub open: [[f64; BANDS]; GATHER_SETS],
         /// By how much the elements that were gathered on differ from their linear functions.
         pub corrections: [[f64; BANDS]; PIXEL_ELEMENTS_KEPT],
@@ -167,7 +178,7 @@ impl Gathered {
         };
         let mean = (0..GATHER_SETS).map(of).sum::<f64>() / GATHER_SETS as f64;
         let squares = (0..GATHER_SETS).map(|part| (of(part) - mean) * (of(part) - mean)).sum::<f64>();
-        (mean, squares / (STRATIFIED * (GATHER_SETS * (GATHER_SETS - 1)) as f64))
+        (mean, squares / (GATHER_STRATIFIED * (GATHER_SETS * (GATHER_SETS - 1)) as f64))
     }
 
     /// The square of the expected error of all bands, relative to the reference, the largest.
@@ -205,11 +216,12 @@ const RAY_SPREAD_LEAST: f64 = 1e-3;
 /// Largest standard deviation of a ray that is expected, over that where half of a hemisphere is bright.
 const RAY_SPREAD_MOST: f64 = 1.0;
 
-/// Standard deviation of what is met where the sun shines over that under the sky alone: places in its light are few and
-/// bright.
-const SUNLIT: f64 = 2.5;
+/// Factor on the standard deviation of the radiance met where the sun shines, over that under the sky alone: places in
+/// its light are few and bright. Measured by `cargo run --release --example calibrate`.
+const SUNLIT_SPREAD: f64 = 2.5;
 
-/// Least standard deviation of what is met over its mean, on the scale of [`RAY_SPREAD_MOST`].
+/// Least ratio of the standard deviation of the radiance met to its mean that is expected, on the scale of
+/// [`RAY_SPREAD_MOST`].
 const LEAST_VARIED: f64 = 0.3;
 
 /// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is met: of
@@ -230,7 +242,7 @@ pub(super) struct Onward<'w> {
     depth: u32,
 }
 
-/// The point of which is asked what arrives there.
+/// A point at which the irradiance is gathered.
 pub(super) struct GatherPoint<'a> {
     pub surface: &'a Surface,
     pub unknown: usize,
@@ -321,7 +333,7 @@ impl Solved<'_> {
         let sequence = Sequence::new(seed);
         let axes = frame(gather_point.surface.normal);
         let tolerance = self.settings.budget.image / gather_point.weight;
-        let goal = (GOAL * tolerance) * (GOAL * tolerance);
+        let goal = (GATHER_GOAL * tolerance) * (GATHER_GOAL * tolerance);
         let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST } else { GATHER_SKY_RAYS_FEWEST };
         let least = clamp(
             GATHER_RAYS_FACTOR_LEAST * usual_rays(tolerance / self.spread_at(gather_point)),
@@ -365,7 +377,7 @@ impl Solved<'_> {
             if *reference > 0.0 { met / reference } else { 0.0 }
         };
         let met = self.reference.iter().enumerate().map(of).fold(0.0, f64::max);
-        let met = if self.light.sun.is_some() { SUNLIT * met } else { met };
+        let met = if self.light.sun.is_some() { SUNLIT_SPREAD * met } else { met };
         let chance = 2.0 * sqrt(blocked * open.share.max(0.0));
         clamp(met * chance.max(LEAST_VARIED * blocked), RAY_SPREAD_LEAST, RAY_SPREAD_MOST)
     }
@@ -503,7 +515,8 @@ impl Solved<'_> {
         }
         let [apart @ .., alike] =
             gathered.carried.map(|sum| (sum / f64::from(rays)) * (sum / f64::from(rays)));
-        let carried = MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + COHERENT * alike;
+        let carried =
+            CARRIED_MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + CARRIED_COHERENT * alike;
         (GATHER_ERROR_FACTOR2 * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
     }
 }

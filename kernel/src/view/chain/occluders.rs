@@ -32,13 +32,13 @@ impl RayKind {
     }
 }
 
-/// The most facets that a way names.
+/// Most facets of one list.
 const OCCLUDERS_MOST: usize = 13;
 
-/// Ways that are remembered, a power of 2.
+/// Number of lists that are kept, a power of 2.
 const LISTS_KEPT: usize = 512;
 
-/// In place of a count: too many.
+/// In place of a list's count: there are too many, and rays are traced.
 const OCCLUDERS_TOO_MANY: u32 = u32::MAX;
 
 plain_struct! {
@@ -55,11 +55,11 @@ plain_struct! {
     }
 }
 
-/// Images of the sun that are remembered.
-const IMAGES: usize = if cfg!(feature = "std") { 128 } else { 0 };
+/// Number of images of the sun that are kept.
+const SUN_IMAGES_KEPT: usize = if cfg!(feature = "std") { 128 } else { 0 };
 
-/// Radius of the ball for whose points they are remembered, over the root of the facet's area.
-const REACH: f64 = 0.06;
+/// Radius of the ball for whose points images of the sun are kept, over the root of the facet's area.
+const SUN_IMAGES_REACH: f64 = 0.06;
 
 /// Images of the sun that may be seen from a ball about a point, of a side of a facet.
 struct Images {
@@ -67,9 +67,9 @@ struct Images {
     side: Option<(usize, usize)>,
     centre: Vec3,
     reach: f64,
-    /// How many there are; more than [`IMAGES`]: they are not remembered.
+    /// How many there are; more than [`SUN_IMAGES_KEPT`]: they are not remembered.
     count: usize,
-    all: [Image; IMAGES],
+    all: [Image; SUN_IMAGES_KEPT],
 }
 
 /// Images of the sun that may be seen from a point, one after the other: those that are remembered, or any.
@@ -111,20 +111,20 @@ pub struct OccluderCache<'m> {
     least_sun: f64,
 }
 
-/// Rays that cost as much as a look.
-const WORTH: f64 = 8.0;
+/// Cost of collecting a facet's occluders, in rays. Measured by `cargo bench --bench stages`.
+const COLLECT_COST: f64 = 8.0;
 
 impl<'m> OccluderCache<'m> {
     /// Values of type [`Occluders`] that a cache holds.
     pub const ROOM: usize = LISTS_KEPT;
 
-    /// For rays that are parallel to begin with, or not; `lists` holds [`OccluderCache::ROOM`], all zero, or none; parallel
-    /// rays have this area each, and so many follow them toward the sun.
+    /// A cache for rays that are parallel to begin with, or not. `lists` holds [`OccluderCache::ROOM`] values, all
+    /// zero, or none; parallel rays have the area `area` each, and `sun` rays follow each of them toward the sun.
     pub fn new(lists: &'m mut [Occluders], parallel: bool, area: f64, sun: f64) -> OccluderCache<'m> {
-        let least = if parallel { WORTH * area } else { 0.0 };
-        let all = [Image::default(); IMAGES];
+        let least = if parallel { COLLECT_COST * area } else { 0.0 };
+        let all = [Image::default(); SUN_IMAGES_KEPT];
         let images = Images { side: None, centre: Vec3::ZERO, reach: 0.0, count: 0, all };
-        let images = (IMAGES > 0).then_some(images);
+        let images = (SUN_IMAGES_KEPT > 0).then_some(images);
         OccluderCache {
             lists,
             images,
@@ -148,7 +148,7 @@ impl<'m> OccluderCache<'m> {
         }
     }
 
-    /// The same with room for outlines.
+    /// The cache with room for outlines.
     pub fn with_candidates(self, candidates: Candidates<'m>) -> OccluderCache<'m> {
         OccluderCache { candidates, ..self }
     }
@@ -167,16 +167,16 @@ impl<'m> OccluderCache<'m> {
         let apart = surface.point - images.centre;
         let here = Some((surface.facet, surface.side));
         if images.side != here || apart.dot(apart) > images.reach * images.reach {
-            let reach = REACH * sqrt(solved.scene.areas().at(surface.facet));
+            let reach = SUN_IMAGES_REACH * sqrt(solved.scene.areas().at(surface.facet));
             (images.side, images.centre, images.reach, images.count) = (here, surface.point, reach, 0);
             for image in near(reach) {
-                if images.count < IMAGES {
+                if images.count < SUN_IMAGES_KEPT {
                     images.all.set(images.count, image);
                 }
                 images.count += 1;
             }
         }
-        if images.count <= IMAGES { Walk::Remembered(0) } else { Walk::All(near(0.0)) }
+        if images.count <= SUN_IMAGES_KEPT { Walk::Remembered(0) } else { Walk::All(near(0.0)) }
     }
 
     /// The facets that may stand in the way of rays that leave the flat `surface`'s side along `direction`, or along any
@@ -210,9 +210,9 @@ impl<'m> OccluderCache<'m> {
     }
 }
 
-/// Facets that come this near to the region in which rays run are taken to be in it: far above the rounding of points,
-/// directions and hits.
-const MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
+/// Distance from the region in which rays run up to which facets count as occluders, in scene coordinates: far above
+/// the rounding of points, directions and hits.
+const OCCLUDER_MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
 
 impl Occluders {
     /// Finds what reaches into the region that the facet sweeps along the directions, from where rays start above it.
@@ -230,7 +230,8 @@ impl Occluders {
             halves.part_mut(1..4).iter_mut().zip([(a, b, c), (b, c, a), (c, a, b)])
         {
             let Some(inward) = inward(to - from, other - from, direction, spread) else { return };
-            *half = HalfSpace { normal: inward, height: inward.dot(from).min(inward.dot(to)) - MARGIN };
+            *half =
+                HalfSpace { normal: inward, height: inward.dot(from).min(inward.dot(to)) - OCCLUDER_MARGIN };
         }
         let (mut count, own) = (0, surface.facet as u32);
         // of what is in the way to an image of the sun, the mirrors that may show it count
@@ -274,7 +275,7 @@ pub(super) fn may_meet(corners: &[Vec3; 3], point: Vec3, axis: Vec3, spread: f64
     let [a, b, c] = *corners;
     let farthest = [a, b, c].iter().map(|&corner| (corner - point).length_squared()).fold(0.0, f64::max);
     // twice the spread: more than its tangent
-    let off = MARGIN + 2.0 * spread * sqrt(farthest);
+    let off = OCCLUDER_MARGIN + 2.0 * spread * sqrt(farthest);
     [(a, b, c), (b, c, a), (c, a, b)].iter().all(|&(from, to, other)| {
         let across = (to - from).cross(axis);
         let across = if across.dot(other - from) < 0.0 { -across } else { across };

@@ -9,15 +9,16 @@ use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
 
-/// Part of the tolerance that circles may leave at a point.
+/// Largest share of the wanted error of images that circles may leave at a point.
 const CIRCLES_ERROR_SHARE: f64 = 0.25;
 
-/// Part of the tolerance that an element's linear function may leave of the straight sky at a point.
-const LOOK: f64 = 0.25;
+/// Share of the wanted error of images above which an element's linear function leaves too much of the straight sky at
+/// a point.
+const OPEN_SKY_ERROR_SHARE: f64 = 0.25;
 
-/// The most by which what is blocked at a point may differ from the element's linear function, as a factor either way: beyond
-/// it nothing tells what arrives from what is blocked.
-const MOST_BLOCKED: f64 = 2.0;
+/// Largest factor, either way, by which the blocked share at a point may differ from the element's linear function.
+/// Beyond it the light from what is blocked cannot be told from the element's.
+const BLOCKED_RATIO_MOST: f64 = 2.0;
 
 plain_table! {
     /// The straight sky at the first point of some elements in one pixel.
@@ -116,7 +117,7 @@ impl<'a> Solved<'a> {
     /// Whether the linear function over an element of this expected squared error is too little for a point of such a weight.
     #[inline]
     pub(super) fn wants_look(&self, weight: f64, variance: f64) -> bool {
-        let most = LOOK * self.settings.budget.image;
+        let most = OPEN_SKY_ERROR_SHARE * self.settings.budget.image;
         weight * weight * variance > most * most
     }
 
@@ -162,5 +163,5 @@ fn blocked_by_element(held: &[f64], bands: usize, local: Local) -> f64 {
 fn ratio(blocked: f64, by_element: f64) -> Option<f64> {
     let same = fabs(blocked - by_element) < straight::BLOCKED_ROUNDING;
     let ratio = if same { 1.0 } else { blocked / by_element };
-    (1.0 / MOST_BLOCKED..=MOST_BLOCKED).contains(&ratio).then_some(ratio)
+    (1.0 / BLOCKED_RATIO_MOST..=BLOCKED_RATIO_MOST).contains(&ratio).then_some(ratio)
 }

@@ -16,20 +16,20 @@ use crate::scene::sun::Sun;
 /// agree, they are enough.
 const DISC_RAYS: u32 = 16;
 
-/// The same of a ray that probes ([`RaySample::Probe`]).
+/// Most rays toward the sun's disc, in a first set, of a ray that probes ([`RaySample::Probe`]).
 const DISC_RAYS_PROBING: u32 = 4;
 
-/// So many of them that what is at stake is wrong by a part of the tolerance: half of it by n^-3/4, at the middle of a
-/// penumbra, is to be this part.
+/// Largest share of the wanted error that a penumbra may bring by the rays of a first set: half of what is at stake,
+/// times n^-3/4.
 const DISC_ERROR: f64 = 0.25;
 
-/// Penumbrae that these rays leave less wrong, in tolerances, need no others.
-const SAMPLED: f64 = 0.1;
+/// Error of a penumbra, in wanted errors, above which the pixel is sampled by more rays.
+const PENUMBRA_ERROR_LEAST: f64 = 0.1;
 
-/// The most times as many where more than the reference radiance is at stake.
+/// Largest factor on [`DISC_RAYS`] where more than the reference radiance is at stake, as in highlights.
 const SUN_RAYS_FACTOR_MOST: f64 = 32.0;
 
-/// The most rays toward the sun's disc.
+/// Most rays toward the sun's disc from one point.
 const MOST_DISC_RAYS: u32 = 1024;
 
 impl Solved<'_> {
@@ -116,7 +116,7 @@ impl Solved<'_> {
                 let alone = matches!(sample, RaySample::Integrate(_));
                 if alone && count < MOST_DISC_RAYS && error > self.settings.budget.image {
                     goal *= 2;
-                } else if !alone && error > SAMPLED * self.settings.budget.image {
+                } else if !alone && error > PENUMBRA_ERROR_LEAST * self.settings.budget.image {
                     path.sampled = true;
                 } else {
                     path.noise += error;

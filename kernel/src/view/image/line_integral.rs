@@ -7,14 +7,14 @@
 use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::fabs;
 
-/// Error of a trapezoid over an interval of width 1 somewhere in which the value jumps by 1: the standard deviation of
-/// a uniform distribution.
+/// Error of the trapezoid rule over an interval of width 1 in which the value jumps by 1 at an unknown place: the
+/// standard deviation of a uniform distribution.
 const JUMP: f64 = 0.29;
 
-/// Values that an integral holds at a time: the left end of what is left to do, and the right ends of halves.
+/// Number of values that an integral holds at a time: the left end of what is left to do, and the right ends of halves.
 const SLOTS: usize = 20;
 
-/// Beside the values of a place: the place, its value's own squared error, the error of the interval to its left.
+/// Numbers beside the values of a place: the place, its value's squared error, the error of the interval to its left.
 const PLACE_NOTES: usize = 3;
 
 /// Memory of one integral of vectors of `stride` values.

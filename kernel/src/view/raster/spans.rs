@@ -40,13 +40,13 @@ pub struct Lines<'m> {
 }
 
 impl<'m> Lines<'m> {
-    /// Adds what so many lines take.
+    /// Adds the memory of `lines` lines.
     pub const fn need(need: Need, lines: usize) -> Need {
         let size = lines.saturating_mul(LINE_SPANS_MOST);
         need.and::<Span>(size).and::<u16>(size).and::<[usize; 2]>(lines).and::<Span>(LINE_SPANS_MOST)
     }
 
-    /// Takes memory for so many lines from the arena.
+    /// Takes the memory of `lines` lines from the arena.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`] where the arena has less than [`Lines::need`].

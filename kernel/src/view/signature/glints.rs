@@ -13,22 +13,22 @@ use crate::rays::surface::Surface;
 use crate::scene::lobe::{Highlight, Lobe};
 use crate::scene::sun::Sun;
 use crate::scene::{MAX_BANDS, Scene};
-use crate::view::chain::{APART, Path, Solved};
+use crate::view::chain::{NARROW_LOBE_RATIO, Path, Solved};
 
-/// Facets of one row of a view that looks for glints.
+/// Number of facets in one row of a view that looks for glints.
 pub(super) const GLINT_FACETS: usize = 64;
 
-/// Halvings of a facet's sides at most.
+/// Most halvings of a facet's sides.
 const GLINT_HALVINGS_MOST: u32 = 9;
 
-/// Parts that wait at most: three of each halving, and one.
+/// Most parts of a facet that wait: three of each halving, and one.
 const GLINT_PARTS_WAITING: usize = 3 * GLINT_HALVINGS_MOST as usize + 1;
 
-/// A part over which the mirrored direction bends by less than this, in half angles of the disc, is linear: its glint is
-/// off by some such share.
-const BEND: f64 = 0.004;
+/// Largest bend of the mirrored direction over a part of a facet, in half angles of the disc, at which the part counts
+/// as linear: its glint is off by about this share.
+const GLINT_BEND_MOST: f64 = 0.004;
 
-/// A part may show so many times the disc.
+/// Largest extent of what a part of a facet may show, in diameters of the sun's disc.
 const GLINT_WIDTH_FACTOR: f64 = 1.5;
 
 /// Lines across a part of a facet.
@@ -37,11 +37,12 @@ const GLINT_LINES: u32 = 64;
 /// Lines across a part where rays from the first [`GLINT_LINES`] disagree.
 const GLINT_LINES_MOST: u32 = 1024;
 
-/// Sums over parts of a lobe: those whose angle is less than this share of that to the disc are small.
+/// Largest angle of a part of a facet, over its angle to the disc, at which the lobe is summed by points of the part.
 const LOBE_PART_ANGLE_MOST: f64 = 0.3;
 
-/// What a part may bring, in tolerances of the reference radiance over the whole view, to be halved no more.
-const FAINT: f64 = 1e-3;
+/// Intensity of a part of a facet, in tolerances of the reference radiance over the whole view, below which the part is
+/// halved no more.
+const GLINT_FAINT: f64 = 1e-3;
 
 /// Whether any facet shows the sun apart from the rays through cells.
 pub(super) fn are_wanted(solved: &Solved<'_>) -> bool {
@@ -53,7 +54,7 @@ pub(super) fn are_wanted(solved: &Solved<'_>) -> bool {
 /// Whether a material's glints are found here: an ideal mirror, or a lobe that is narrow.
 fn is_apart(scene: &Scene<'_>, material: usize) -> bool {
     scene.mirror(material) != crate::scene::NO_MIRROR
-        && scene.gloss(material).is_none_or(|ratio| ratio >= APART)
+        && scene.gloss(material).is_none_or(|ratio| ratio >= NARROW_LOBE_RATIO)
 }
 
 /// Three points in a facet's barycentric weights, and how often its sides were halved for them.
@@ -191,7 +192,9 @@ impl Glints<'_, '_> {
                 return None;
             }
             let bend = (ends[0] + ends[1] + ends[2]) / 3.0 - middle;
-            Some(sqrt(bend.length_squared()) > BEND * radius || reach > GLINT_WIDTH_FACTOR * radius)
+            Some(
+                sqrt(bend.length_squared()) > GLINT_BEND_MOST * radius || reach > GLINT_WIDTH_FACTOR * radius,
+            )
         };
         let (first, second) = frame(axis);
         self.parts(halves, |this, part| {
@@ -252,7 +255,7 @@ impl Glints<'_, '_> {
         let (axis, solved) = (seen.sun.direction(), self.solved);
         let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
         let scale = self.scale(seen);
-        let faint = FAINT * solved.settings.budget.image * self.whole;
+        let faint = GLINT_FAINT * solved.settings.budget.image * self.whole;
         let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
         let halves = |this: &mut Self, part: &Part| {
             let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
