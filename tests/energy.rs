@@ -77,8 +77,8 @@ fn what_a_uniform_sky_sends_is_absorbed_or_sent_back() {
         let (into, kept, out) =
             (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
         println!("{name}: in {into}, absorbed {kept}, sent {out}, balance {}", (kept + out) / into - 1.0);
-        // 1.6 % for the directions at worst, the tolerance for each of both fluxes
-        assert!((kept + out - into).abs() < 0.03 * into, "{name}");
+        // the tolerance: errors of the fluxes are of both signs and partly cancel
+        assert!((kept + out - into).abs() < 0.01 * into, "{name}");
         assert!(kept > 0.1 * into && out > 0.1 * into, "{name}: both parts count");
     }
 }
@@ -93,8 +93,8 @@ fn what_the_sun_sends_is_absorbed_or_sent_back_by_diffuse_facets() {
         let (into, kept, out) =
             (received(&case, &settings), absorbed(&case, &settings), sent(&case, &settings));
         println!("{name}: in {into}, absorbed {kept}, sent {out}, balance {}", (kept + out) / into - 1.0);
-        // as above; an element in half shadow brings another 1.6 % of its flux
-        assert!((kept + out - into).abs() < 0.04 * into, "{name}");
+        // as above, and as much again for elements in half shadow, whose flux is wrong by 1.6 %
+        assert!((kept + out - into).abs() < 0.02 * into, "{name}");
     }
 }
 

@@ -125,11 +125,10 @@ fn every_reference_is_met() {
 /// Where the airplane's reference disagrees about narrow facets, the twin, whose rays start on the facet itself, sides
 /// with the kernel: that is why they may be left out.
 #[test]
+#[ignore = "needs the airplane's reference, which is not in the repository"]
 fn the_twin_settles_what_narrow_facets_receive() {
-    let Some(reference) = references::all().into_iter().find(|r| r.id == "airplane_d0.4_s0_csun") else {
-        println!("no airplane: nothing to settle");
-        return;
-    };
+    let airplane = references::all().into_iter().find(|r| r.id == "airplane_d0.4_s0_csun");
+    let reference = airplane.expect("the airplane's reference is where the others are");
     let (scene, _) = scene_file::read(&reference.scene);
     let settings = Settings { all_irradiances: true, ..Settings::default() };
     let mine = solve(&scene, &settings, |_, lit| irradiances(lit));
