@@ -43,6 +43,24 @@
 //! | (13) to (15) | the chain of a pixel | [`view::chain`], for all pixels: [`view::image`] |
 //! | (16) | eps, the relative rms error of an image | estimated: `host::Report`; measured: `tests/support/metric.rs` |
 //!
+//! # Words
+//!
+//! | word here | meaning |
+//! |---|---|
+//! | element | a facet, or one of the triangles that it is refined into, over which reflected light varies linearly |
+//! | unknown | one side of an element |
+//! | row | the extended form factors of one unknown: what it sees, straight and by way of mirrors |
+//! | record | one entry of a row: target, weight, mirror path |
+//! | mirror path | the mirror classes on the way from one facet to another, in any order |
+//! | escape, bundle | an entry of a row that ends in the sky; many of them, four bytes each |
+//! | throughput | product of the reflectances along a path |
+//! | straight sky | the sky that a point sees without a mirror between |
+//! | occluder | a facet that may stand in the way of rays from another |
+//! | final gathering | rays from a point that is looked at, in place of its element's linear function |
+//! | item buffer | the facet that each pixel's centre shows, drawn instead of traced |
+//! | image of the sun | a direction in which flat mirrors show the sun to a facet |
+//! | black back | the back of a one-sided facet: opaque, of radiance 0 |
+//!
 //! # Symbols
 //!
 //! | symbol | name here | unit |

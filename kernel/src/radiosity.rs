@@ -100,7 +100,8 @@ impl System<'_> {
                 if let Some(sun) = &self.light.sun {
                     irradiance += self.sun.at(unknown) * sun.irradiance(band);
                 }
-                // what slopes add may be negative, where next to nothing arrives
+                // eq. (12): I = I_0 + rho_d/pi E, E = E_0 + pi sum phi I; what gradients add to E_0 may be negative, where
+                // next to nothing arrives
                 let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance.max(0.0);
                 let old = from.at(unknown * bands + band);
                 let reference = reference.at(band);
@@ -365,7 +366,7 @@ impl System<'_> {
 /// records, which come to sqrt(n).
 pub const STEP_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// `new` itself where the relaxation is 1.
+/// The step from the old value to the new one, times the relaxation; `new` itself where that is 1.
 #[inline(always)]
 fn relax(old: f64, new: f64, relaxation: f64) -> f64 {
     if relaxation == 1.0 { new } else { relaxation * (new - old) + old }

@@ -1,4 +1,4 @@
-//! What the stages follow from the one number that the caller states.
+//! Settings of all stages, derived from the one tolerance that the caller states.
 //!
 //! Every layer over the kernel (the owning one, the C interface, bare metal) decides here, so that all compute the
 //! same bits.

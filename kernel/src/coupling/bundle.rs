@@ -1,4 +1,5 @@
-//! Escapes to the sky in little memory: most rays of a row count alike and differ in their directions alone.
+//! Bundles: a row's escapes to the sky in little memory. Most rays of a row count alike and differ in their directions
+//! alone.
 //!
 //! While a row grows an escape is a [`Record`]; in a finished row rays of the same path, weight, gradient and half differences
 //! are a bundle, and each costs the four bytes of its direction. Bundles stand where the row's records did: 32-bit

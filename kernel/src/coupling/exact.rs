@@ -1,8 +1,8 @@
-//! Entries of a row to facets that nothing hides: form factors in closed form from points of the element, no rays.
+//! Entries of a row to facets that nothing hides: form factors in closed form, without rays.
 //!
-//! [`crate::coupling::plane_sides`] proves what nothing stands before. Such a pair's factor from a point is Lambert's; its mean over
-//! each of the element's quarters takes Gauss points as near to each other as the distance asks for, and makes mean,
-//! gradients and the departure from them as rays' hits would. The quadrature's error is a small part of that which
+//! [`crate::coupling::plane_sides`] proves that nothing stands between. Such a pair's factor from a point is Lambert's.
+//! Its mean over each of the element's quarters takes Gauss points as dense as the distance asks for. The quarters give
+//! mean, gradients and departure from them as rays' hits would. The quadrature's error is a small part of that which
 //! the row's rays would have.
 
 use super::mirror_path::STRAIGHT;

@@ -1,4 +1,4 @@
-//! Gives back what a finished block does not use.
+//! Packing of a finished block: its parts are moved together, and the unused memory is given back.
 
 use super::mirror_path::MirrorPath;
 use super::{Head, Record, Row};

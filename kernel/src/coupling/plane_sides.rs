@@ -1,4 +1,4 @@
-//! What may stand between two facets, told by planes alone: which facets rise before which sides' planes.
+//! Visibility between facets by planes alone: for each side of a facet, the facets that rise before its plane.
 //!
 //! A segment from one facet to another stays before both facets' planes. What does not rise before both, or has all
 //! facets on one side of its own plane, is not in its way; what is left is tried against the shaft, the convex hull of

@@ -1,10 +1,10 @@
-//! How finely each facet is cut: into quarters, and those again, where what arrives varies in a way that no linear
-//! function follows, such as around what stands on a facet or pierces it.
+//! Adaptive subdivision of facets into quarters, where the irradiance departs from a linear function: about objects
+//! that stand on a facet or pierce it.
 //!
-//! Geometry, materials and tolerance decide, never sky and sun. Level by level: [`SubdivisionTree::newest_level`] gives the newest
-//! triangles, [`Level::probe`] (on any range of them) looks how uneven they are, [`SubdivisionTree::refine`] quarters those whose
-//! error counts most. Triangles far larger than what stands close before them are quartered first: their probed points
-//! are too far from each other to tell.
+//! Geometry, materials and tolerance decide, never sky and sun. It goes level by level:
+//! [`SubdivisionTree::newest_level`] gives the newest triangles, [`Level::probe`] (on any range of them) measures their
+//! unevenness, [`SubdivisionTree::refine`] quarters those whose error counts most. Triangles far larger than objects
+//! close before them are quartered first: their probed points are too far from each other to show such objects.
 
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::budget::ErrorBudget;

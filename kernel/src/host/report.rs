@@ -1,4 +1,4 @@
-//! What comes back with every result: how good it is, what was done, what was not needed.
+//! The report that comes with every result: its estimated error, the work done, what was left out.
 
 use crate::base::budget::ErrorBudget;
 use crate::coupling::{ABSENT, Coupling, OPEN};

@@ -1,4 +1,4 @@
-//! Images that come out worse than asked are computed again, more finely.
+//! Rounds: an image whose estimated error exceeds the tolerance is computed again from a finer solution.
 
 use super::{Rays, Report, Seconds, Settings};
 use crate::rounds::{self, Round};

@@ -1,13 +1,11 @@
-//! How wrong the diffuse solution is expected to be: from differences between independent resolutions, under the light
-//! that there is.
+//! Expected errors of the diffuse solution, from differences between independent resolutions, under the given light.
 //!
-//! Every row of the coupling was traced in two halves, from four quarters of its element. What both halves see of the
-//! solved radiances differs by their rays' noise; what the middle quarter sees beside the mean of the others is what
-//! the linear function over the element leaves out, and the product of both halves' values for it is free of noise's
-//! bias.
+//! Every row of the coupling was traced in two halves, from four quarters of its element. The radiance that both halves
+//! see differs by their rays' noise. The radiance that the middle quarter sees, beside the mean of the others, is what
+//! the linear function over the element leaves out; the product of both halves' values for it is free of noise's bias.
 //!
-//! The halves' differences go on from element to element as light does: in rooms that reflect much, small errors of
-//! all rows add up.
+//! The halves' differences are propagated from element to element as light is: in rooms that reflect much, small errors
+//! of all rows add up.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces, span};

@@ -1,4 +1,4 @@
-//! Sunlight that mirrors throw onto diffuse facets.
+//! Beams: sunlight that mirrors reflect onto diffuse facets.
 //!
 //! Each side of a mirror facet that faces the sun sends a share of its sunlight along mirror chains; what
 //! arrives at a diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row =

@@ -1,4 +1,5 @@
-//! What sky and sun give each element before any diffuse reflection, straight and by way of mirrors.
+//! Direct light of each element: irradiance by sky and sun before any diffuse reflection, straight and by way of
+//! mirrors. It is the right-hand side of eq. (12).
 //!
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.

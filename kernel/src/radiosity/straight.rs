@@ -1,8 +1,7 @@
-//! The sky that elements see straight, by outlines: no rays, and exact where nothing that may cover the sky is covered
-//! itself.
+//! The straight sky of elements, by outlines, without rays. It is exact where no facet before the sky hides another.
 //!
-//! Each element is looked at from the middles of its four quarters, and where a linear function over it leaves out more than
-//! is wanted, from those of their quarters: an edge of what hides the sky crosses it.
+//! Each element is evaluated at the middles of its four quarters; where a linear function over it leaves out more than
+//! is wanted, as an edge of a shadow crosses it, at those of their quarters.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};

@@ -1,10 +1,10 @@
-//! Images of the sun: where a flat mirror shows it to a diffuse facet, what arrives is computed at every point that is
-//! looked at, with sharp edges, instead of as a mean over an element.
+//! Images of the sun: directions in which flat mirrors show it to a diffuse facet. The irradiance by an image is
+//! computed at every point that is looked at, with sharp edges, instead of as a mean over an element.
 //!
-//! A chain of flat ideal mirrors turns the sun into one that stands elsewhere, as seen from where the chain throws its
-//! light. [`crate::radiosity::beam::add`] notes, for each side of a facet, in which directions such suns stand; rays from a point
-//! toward them meet the mirrors or not, as the view's chains find. Light by way of lobes and curved mirrors, and that of sides
-//! with more images than there is room for, stays a mean over elements.
+//! A chain of flat ideal mirrors turns the sun into one that stands elsewhere, as seen from where the chain leads its
+//! light. [`crate::radiosity::beam::add`] stores the directions of such suns for each side of a facet. Rays from a
+//! point toward them meet the mirrors or not, as the view's chains find. Light by way of lobes and curved mirrors, and
+//! that of sides with more images than there is room for, stays a mean over elements.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces};

@@ -1,4 +1,4 @@
-//! What is open above a point, by the outlines of what stands there: no rays.
+//! The open sky above a point, by the outlines of the facets before it, without rays.
 //!
 //! The number of facets in a direction changes only at *outline edges*: edges whose two facets turn different sides to the
 //! point, or that have one facet. Lambert's contour sum over them, each times its jump of counted facets, is the exact sum

@@ -1,4 +1,5 @@
-//! Where light goes on from a facet: the point, the side, and the mirror direction.
+//! A point of a facet's side at which light is reflected: where rays from it start, its mirror direction, the rays of
+//! its lobe.
 
 use crate::base::index::Index;
 use crate::base::math::{Vec3, reflect, sqrt};

@@ -1,4 +1,5 @@
-//! From a scene to its coupling: how finely facets are cut, and the rows of all elements, in memory of the caller's.
+//! From a scene to its coupling: refinement of facets into elements, and the rows of all elements, in memory of the
+//! caller's.
 
 use super::{Count, Executor, LANES_MOST, block_rows};
 use crate::base::arena::{ALIGNMENT, plain_struct};

@@ -1,4 +1,5 @@
-//! The linear system's solution: sweeps to the end, twice where elements' gradients add to what they send, and its errors.
+//! The solution of the linear system: sweeps to the end, twice where elements' gradients add to the radiance that they
+//! send; and its expected errors.
 
 use super::light::{Lighting, SHARES, Scratch};
 use super::{Executor, Largest};

@@ -1,4 +1,4 @@
-//! What a facet receives and sends, as means over its elements.
+//! Mean irradiance and radiance of a facet's side over its elements.
 
 use crate::base::math::FRAC_1_PI;
 use crate::coupling::Coupling;

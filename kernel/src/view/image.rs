@@ -1,4 +1,5 @@
-//! The image: one chain per pixel centre, more where the radiance changes from pixel to pixel.
+//! Images: eq. (15) along the ray through each pixel's centre, and along more rays where the radiance changes from
+//! pixel to pixel.
 
 mod centres;
 mod line_integral;

@@ -1,4 +1,5 @@
-//! What a distant observer measures of the whole object, without an image: radiant intensity, projected area.
+//! Signatures: the radiant intensity and the projected area of the whole object for a distant observer, without an
+//! image.
 //!
 //! Rays through cells tell all but what the first mirror or narrow lobe shows of the sun, which is found facet by facet
 //! (`glints`) and may be far smaller than a cell.

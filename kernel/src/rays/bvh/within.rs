@@ -1,5 +1,4 @@
-//! Which facets reach into a convex region: those of a row of pixels, or those that may stand in the way of parallel
-//! rays that leave a facet.
+//! Facets that reach into a convex region: of a row of pixels, or of parallel rays that leave a facet.
 
 use super::path_stack::{EMPTY_STACK, push, top};
 use super::{Boxes, Bvh, LEAF_CHILD, PACKET_LANES, PAIR, Packet};

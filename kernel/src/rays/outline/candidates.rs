@@ -1,4 +1,4 @@
-//! What matters to the points of one facet: the edges that are outlines from some of them, and the facets over their pole.
+//! The outlines of one facet: the edges that are outlines from some of its points, and the facets over their pole.
 
 use super::contour::{self, Contour, spread, sweep};
 use super::{

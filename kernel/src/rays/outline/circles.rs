@@ -1,4 +1,4 @@
-//! By how much the sum of all counted facets differs from what is blocked, along great circles through the pole.
+//! Overlap of counted facets along great circles through the pole: the difference of their sum from the blocked share.
 //!
 //! Each circle is crossed by outlines on either side of the pole; between crossings the number of facets stays, and that of
 //! counted ones. Eight circles are a set; later sets lie between those before.

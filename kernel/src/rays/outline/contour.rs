@@ -1,4 +1,4 @@
-//! The sum over all counted facets that rise above a point, by their outlines.
+//! Lambert's contour sum over the outlines above a point: the sum of the form factors of all counted facets.
 
 use super::candidates::{Active, Frame};
 use super::{Basis, Block, OUTLINE_HEIGHT_SLACK};

@@ -1,13 +1,15 @@
-//! What arrives at a point, by rays from it, where the linear function over its element is not good enough: beside
-//! contacts, in corners that rows see too coarsely, on elements as large as their mesh.
+//! Final gathering: the irradiance at a point by rays from it, where the linear function over its element is not
+//! accurate enough. That is beside contacts, in corners that rows sample too coarsely, on elements as large as their
+//! mesh.
 //!
-//! Rays are cosine-distributed, meet the solved radiances of what they see, straight or by way of mirrors, and go on in
-//! sets, each as large as all before, until their parts agree. Error of n rays whose light has the standard
-//! deviation s: about s n^-3/4. Where facets hide little of the sky, its irradiance is the exact one of the plane less what
-//! they hide.
+//! Rays are cosine-distributed and carry the solved radiances of the facets that they meet, straight or by way of
+//! mirrors. They come in sets, each as large as all before, until the parts of them agree. The error of n rays whose
+//! radiance has the standard deviation s is about s n^-3/4. Where facets hide little of the sky, its irradiance is the
+//! exact one of the plane less the hidden part.
 //!
-//! Where a ray is short beside the element that it meets, the element's linear function says nothing of light there: beside
-//! contact lines, where a body is pierced by another. The ray goes on diffusely from there, as paths do, until it is not.
+//! Where a ray is short beside the element that it meets, the element's linear function is not accurate there either:
+//! beside contact lines, where a body is pierced by another. The ray goes on diffusely from there, as a path, until it
+//! is not.
 
 use super::straight::KeptSkies;
 use super::{DetailCache, Mode, OpenAt, Path, PathState, RaySample, SIGNS, Solved, Terms, held};

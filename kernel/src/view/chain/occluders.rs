@@ -1,4 +1,5 @@
-//! What may stand before a flat facet in one direction: nothing, mostly, and then rays that leave it need not be traced.
+//! A cache of occluders: the facets that may stand before a flat facet in one direction. Mostly there are none, and
+//! rays that leave it need not be traced.
 
 use super::Solved;
 use crate::base::arena::plain_struct;

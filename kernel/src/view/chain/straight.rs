@@ -1,4 +1,4 @@
-//! The sky that a point sees straight, by outlines, in place of what its element holds of it.
+//! The straight sky at a point, by outlines, in place of its element's linear function.
 
 use super::gather::{BANDS, PIXEL_ELEMENTS_KEPT, find};
 use super::{OccluderCache, Solved, linear};

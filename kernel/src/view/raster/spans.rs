@@ -1,4 +1,4 @@
-//! What a line across the object shows, from end to end: the facets that are nearest, and where each begins and ends.
+//! Spans of a line across the object: the nearest facets, and where each begins and ends.
 
 use super::{Samples, Triangle, View};
 use crate::base::arena::{Arena, Need, plain_struct};
