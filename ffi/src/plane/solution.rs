@@ -235,16 +235,7 @@ fn build(
     let next = work_arena.take::<f64>(unknowns)?;
     let mut relaxed = Relaxed::default();
     if (0..unknowns).any(|u| reflects(coupling, u)) {
-        let rows = settings.rows();
-        let cuts = light.cuts().len();
-        let lanes = Lanes::new(scratch, lane_bytes(scene, cuts)?, runner)?;
-        let start = Start(direct.as_mut_ptr());
-        lanes.rows(unknowns, 1.0, (scene, cuts), runner, &|range, scratch| {
-            let open = coupling.open.get(range.start * classes..range.end * classes).unwrap_or_default();
-            // SAFETY: ranges are disjoint and within the unknowns.
-            let out = unsafe { part(&start, &range, classes) };
-            Ok(direct::fill(scene, &light, &rows, range, open, out, scratch)?)
-        })?;
+        fill_direct(coupling, &light, scratch, direct, runner)?;
         let system = System::new(scene, coupling.matrix, direct)?;
         let goal = settings.max_bounces.is_none().then_some(settings.solver);
         relaxed = system.solve(goal, radiance, next)?;
@@ -266,6 +257,26 @@ fn build(
     // SAFETY: `place` made room for it.
     unsafe { place.write(handle) };
     Ok(place.as_ptr())
+}
+
+/// Fills the table of direct light, one value for each unknown and class.
+fn fill_direct(
+    coupling: &blik_plane_coupling,
+    light: &Light<'_>,
+    scratch: &mut [u8],
+    direct: &mut [f64],
+    runner: &mut Runner,
+) -> Result<(), blik_error> {
+    let (scene, rows) = (&coupling.base.scene, coupling.base.settings.rows());
+    let (classes, cuts) = (classes(coupling.base), light.cuts().len());
+    let lanes = Lanes::new(scratch, lane_bytes(scene, cuts)?, runner)?;
+    let start = Start(direct.as_mut_ptr());
+    lanes.rows(scene.unknowns(), 1.0, (scene, cuts), runner, &|range, scratch| {
+        let open = coupling.open.get(range.start * classes..range.end * classes).unwrap_or_default();
+        // SAFETY: ranges are disjoint and within the unknowns.
+        let out = unsafe { part(&start, &range, classes) };
+        Ok(direct::fill(scene, light, &rows, range, open, out, scratch)?)
+    })
 }
 
 /// Whether an unknown reflects anything diffusely.

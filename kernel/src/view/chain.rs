@@ -787,10 +787,11 @@ impl Solved<'_> {
         };
         let sun = self.light.sun.as_ref().filter(|_| sunlit > 0.0);
         if goes_on {
-            let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
-            for (band, ((to, throughput), rho)) in own.enumerate() {
-                let Some(sun) = sun else { break };
-                *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
+            if let Some(sun) = sun {
+                let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
+                own.enumerate().for_each(|(band, ((to, throughput), rho))| {
+                    *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
+                });
             }
             return;
         }
@@ -840,7 +841,7 @@ impl Solved<'_> {
 
     /// What is known at a point beyond its element's linear function: the straight sky, where the element's leaves too much
     /// of it, and final gathering, where the element's expected error is too large.
-    #[inline]
+    #[inline(always)]
     fn arriving<'g>(
         &'g self,
         point: &GatherPoint<'_>,

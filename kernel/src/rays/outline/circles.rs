@@ -84,11 +84,7 @@ pub(super) fn look(
             most = most.max(met);
             for (half, terms) in own.iter().enumerate() {
                 sums.iter_mut().flatten().zip(terms.iter().flatten()).for_each(|(sum, term)| *sum += term);
-                let part = match sets {
-                    1 => half % CIRCLE_SETS,
-                    2 => half % 2 + 2 * (set as usize),
-                    _ => set as usize * CIRCLE_SETS / sets as usize,
-                };
+                let part = part_of(half, set, sets);
                 for (sums, term) in parts.iter_mut().zip(terms) {
                     let sum = sums.at(part) + term[0];
                     sums.set(part, sum);
@@ -121,6 +117,15 @@ pub(super) fn look(
         }
         parts.iter_mut().for_each(|parts| *parts = gathered(parts, sets));
         sets *= 2;
+    }
+}
+
+/// The part of the half circles to which one of set number `set` belongs, of `sets` sets.
+fn part_of(half: usize, set: u32, sets: u32) -> usize {
+    match sets {
+        1 => half % CIRCLE_SETS,
+        2 => half % 2 + 2 * (set as usize),
+        _ => set as usize * CIRCLE_SETS / sets as usize,
     }
 }
 

@@ -161,6 +161,51 @@ impl<'a> Table<'a> {
         level * cos(elevation) + self.up * sin(elevation)
     }
 
+    /// Largest share of a spectrum in the samples on the rim of a window.
+    fn rim(&self, window: &Spot, spectrum: &[f32]) -> f64 {
+        let (top, bottom) = (window.first_row, window.first_row + window.rows - 1);
+        let wide = window.columns + 2;
+        let mut base: f64 = 0.0;
+        for row in top.saturating_sub(1)..=(bottom + 1).min(self.rows - 1) {
+            for across in 0..wide {
+                let edge = row < top || row > bottom || across == 0 || across == wide - 1;
+                let column = self.wrapped(window.first_column as isize + across as isize - 1);
+                let ratio = self.ratio(self.sample(row, column), spectrum);
+                base = base.max(if edge && ratio.is_finite() { ratio } else { 0.0 });
+            }
+        }
+        base
+    }
+
+    /// Irradiance of a spot over its peak's radiance, its weighted middle, and the weighted squared distances from that.
+    fn moments(&self, spot: &Spot) -> (f64, Vec3, f64) {
+        let step = (PI / self.rows as f64, TAU / self.columns as f64);
+        let (mut energy, mut middle, mut square) = (0.0, Vec3::ZERO, 0.0);
+        for pass in 0..2 {
+            let axis = unit(middle).unwrap_or(Vec3::Z);
+            (energy, square) = (0.0, 0.0);
+            let rows = spot.first_row..spot.first_row + spot.rows;
+            for (row, across) in rows.flat_map(|row| (0..spot.columns).map(move |a| (row, a))) {
+                let column = self.wrapped(spot.first_column as isize + across as isize);
+                let height = FRAC_PI_2 - (row as f64 + 0.5) * step.0;
+                let share = self.taken(spot, row, column) * step.0 * step.1 * cos(height);
+                let toward = self.toward(row as f64, column as f64);
+                energy += share;
+                if pass == 0 {
+                    middle += toward * share;
+                } else {
+                    square += share * (toward - axis).length_squared();
+                }
+            }
+        }
+        (energy, middle, square)
+    }
+
+    /// A column of the table, counted around.
+    fn wrapped(&self, column: isize) -> usize {
+        column.rem_euclid((self.columns as isize).max(1)) as usize
+    }
+
     /// Takes the brightest spot out, where it is small and far brighter than what stands about it. `factors` are the bands'.
     pub(super) fn take_sun(&mut self, factors: &[f64]) -> Option<SpotSun<'a>> {
         let weight = |sample: &[f32]| {
@@ -182,47 +227,23 @@ impl<'a> Table<'a> {
         if most <= 0.0 || 2 * aside + 3 >= self.columns {
             return None;
         }
-        let wrapped = |column: isize| column.rem_euclid((self.columns as isize).max(1)) as usize;
-        let left = wrapped(column as isize - aside as isize);
+        let left = self.wrapped(column as isize - aside as isize);
         let peak = place * self.bands;
         let spectrum = self.samples.get(peak..peak + self.bands)?;
-        let mut base: f64 = 0.0;
-        for row in top.saturating_sub(1)..=(bottom + 1).min(self.rows - 1) {
-            for across in 0..2 * aside + 3 {
-                let edge = row < top || row > bottom || across == 0 || across == 2 * aside + 2;
-                let column = wrapped(left as isize + across as isize - 1);
-                let ratio = self.ratio(self.sample(row, column), spectrum);
-                base = base.max(if edge && ratio.is_finite() { ratio } else { 0.0 });
-            }
-        }
-        if base * BRIGHT > 1.0 {
-            return None;
-        }
-        let spot = Spot {
+        let window = Spot {
             first_row: top,
             rows: bottom + 1 - top,
             first_column: left,
             columns: 2 * aside + 1,
             peak,
-            base,
+            base: 0.0,
         };
-        let (mut energy, mut middle, mut square) = (0.0, Vec3::ZERO, 0.0);
-        for pass in 0..2 {
-            let axis = unit(middle).unwrap_or(Vec3::Z);
-            (energy, square) = (0.0, 0.0);
-            for (row, across) in (top..=bottom).flat_map(|row| (0..=2 * aside).map(move |a| (row, a))) {
-                let column = wrapped(left as isize + across as isize);
-                let height = FRAC_PI_2 - (row as f64 + 0.5) * step.0;
-                let share = self.taken(&spot, row, column) * step.0 * step.1 * cos(height);
-                let toward = self.toward(row as f64, column as f64);
-                energy += share;
-                if pass == 0 {
-                    middle += toward * share;
-                } else {
-                    square += share * (toward - axis).length_squared();
-                }
-            }
+        let base = self.rim(&window, spectrum);
+        if base * BRIGHT > 1.0 {
+            return None;
         }
+        let spot = Spot { base, ..window };
+        let (energy, middle, square) = self.moments(&spot);
         // a bilinear hat of two steps spreads what a sample holds by a sixth of a step squared, each way
         let width = level * step.1;
         let spread = square / energy + (step.0 * step.0 + width * width) / 6.0;
