@@ -560,11 +560,11 @@ typedef struct blik_settings {
      * as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
      * goes on at a steady number of rays a second. */
     uint64_t ray_budget;
-    /* 0 (default), or 1e-6 to 0.1. Where it is above 0 and below the tolerance, that is the solution's alone, and this the
-     * wanted error of images: rays from the points that an image shows find what a solution lacks that is there sooner. For
-     * few images of little error, which take longer each. No such rays are sent without the standard library, nor where
-     * max_bounces is given, or lobes or curved mirrors throw sunlight: the report's error estimate tells. Baked blocks do
-     * not keep it. */
+    /* Wanted error of images, 1e-6 to 0.1; 0 (default): tolerance. If it is smaller than tolerance, the diffuse
+     * solution is computed to tolerance only, and final gathering at the points that an image shows removes the
+     * rest: faster for one or two precise images, slower for many. There is no final gathering without the standard
+     * library, where max_bounces is given, or where lobes or curved mirrors reflect sunlight onto facets: the
+     * report's error estimate tells. Baked blocks do not keep it. */
     double image_tolerance;
 } blik_settings;
 
@@ -772,8 +772,8 @@ static inline void blik_light_init(blik_light *light)
 /* A solved scene in memory. Read-only once made: any number of threads may use it at once. */
 typedef struct blik_solution blik_solution;
 
-/* Bytes of memory that blik_solution_init needs for this light, at any address. More speeds up scenes with mirrors and a
- * sun on several threads.
+/* Bytes of memory that blik_solution_init needs for this light, at any address. More speeds up scenes with mirrors
+ * and a sun on several threads.
  *
  *   coupling  the coupling
  *   light     the light
@@ -782,10 +782,10 @@ typedef struct blik_solution blik_solution;
 BLIK_API blik_status blik_solution_size(const blik_coupling *coupling, const blik_light *light, blik_error *error,
     size_t *bytes);
 
-/* Lights a scene and solves for its diffuse radiance, in the caller's memory. Another light is another call, in the same
- * memory or other: the coupling is not computed anew, and no ray toward the sky is traced. Where mirrors scatter sunlight
- * over many more elements than usual, the call returns BLIK_ERROR_BUFFER_TOO_SMALL, and error->needed says how many bytes
- * probably do.
+/* Lights a scene and solves for its diffuse radiance, in the caller's memory. Another light is another call, in the
+ * same memory or other: the coupling is not computed anew, and no ray toward the sky is traced. Where mirrors scatter
+ * sunlight over many more elements than usual, the call returns BLIK_ERROR_BUFFER_TOO_SMALL, and error->needed
+ * says how many bytes probably do.
  *
  *   coupling  the coupling, which must outlive the solution
  *   light     the light; not needed afterwards
@@ -1018,7 +1018,7 @@ typedef struct blik_report {
     double certified_dropped;
     /* Rays that coupling traced. */
     uint64_t visibility_rays;
-    /* Rays toward the sun, and of the beams that mirrors throw. */
+    /* Rays toward the sun, and of beams, which mirrors reflect. */
     uint64_t sun_rays;
     /* Rays through pixels. */
     uint64_t primary_rays;

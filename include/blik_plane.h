@@ -68,8 +68,8 @@ typedef enum blik_plane_shape {
 } blik_plane_shape;
 
 /* A body of the plane model: a circle, or segments whose fronts are on the right of their direction (counter-clockwise
- * for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners. Arrays of
- * it have a stride: it may grow. */
+ * for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners.
+ * Arrays of it have a stride: it may grow. */
 typedef struct blik_plane_body {
     /* Circle (default), polyline or polygon. */
     blik_plane_shape shape;

@@ -41,7 +41,7 @@ pub struct blik_report {
     pub certified_dropped: f64,
     /// Rays that coupling traced.
     pub visibility_rays: u64,
-    /// Rays toward the sun, and of the beams that mirrors throw.
+    /// Rays toward the sun, and of beams, which mirrors reflect.
     pub sun_rays: u64,
     /// Rays through pixels.
     pub primary_rays: u64,

@@ -263,8 +263,8 @@ fn build(
     Ok(place.as_ptr())
 }
 
-/// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with mirrors and a
-/// sun on several threads.
+/// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with mirrors
+/// and a sun on several threads.
 ///
 /// - `coupling`: the coupling
 /// - `light`: the light
@@ -293,10 +293,10 @@ pub unsafe extern "C" fn blik_solution_size(
     })
 }
 
-/// Lights a scene and solves for its diffuse radiance, in the caller's memory. Another light is another call, in the same
-/// memory or other: the coupling is not computed anew, and no ray toward the sky is traced. Where mirrors scatter sunlight
-/// over many more elements than usual, the call returns `BLIK_ERROR_BUFFER_TOO_SMALL`, and `error->needed` says how many bytes
-/// probably do.
+/// Lights a scene and solves for its diffuse radiance, in the caller's memory. Another light is another call, in the
+/// same memory or other: the coupling is not computed anew, and no ray toward the sky is traced. Where mirrors scatter
+/// sunlight over many more elements than usual, the call returns `BLIK_ERROR_BUFFER_TOO_SMALL`, and `error->needed`
+/// says how many bytes probably do.
 ///
 /// - `coupling`: the coupling, which must outlive the solution
 /// - `light`: the light; not needed afterwards

@@ -109,11 +109,11 @@ pub struct blik_settings {
     /// as the tolerance needs. What fewer cost is in the report's error estimate. It is a budget of time, too: coupling
     /// goes on at a steady number of rays a second.
     pub ray_budget: u64,
-    /// 0 (default), or 1e-6 to 0.1. Where it is above 0 and below the tolerance, that is the solution's alone, and this the
-    /// wanted error of images: rays from the points that an image shows find what a solution lacks that is there sooner. For
-    /// few images of little error, which take longer each. No such rays are sent without the standard library, nor where
-    /// `max_bounces` is given, or lobes or curved mirrors throw sunlight: the report's error estimate tells. Baked blocks do
-    /// not keep it.
+    /// Wanted error of images, 1e-6 to 0.1; 0 (default): `tolerance`. If it is smaller than `tolerance`, the diffuse
+    /// solution is computed to `tolerance` only, and final gathering at the points that an image shows removes the
+    /// rest: faster for one or two precise images, slower for many. There is no final gathering without the standard
+    /// library, where `max_bounces` is given, or where lobes or curved mirrors reflect sunlight onto facets: the
+    /// report's error estimate tells. Baked blocks do not keep it.
     pub image_tolerance: f64,
 }
 

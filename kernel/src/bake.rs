@@ -82,7 +82,7 @@ plain_struct! {
         pub sun_direction: [f64; 3],
         /// Half angle of the sun.
         pub half_angle_deg: f64,
-        /// 1 where mirrors throw sunlight.
+        /// 1 where mirrors reflect sunlight onto facets.
         pub images: u64,
         /// 1 where outlines tell the straight sky.
         pub straight: u64,

@@ -47,10 +47,10 @@ use std::vec::Vec;
 pub struct Settings {
     /// The wanted error of the image, eq. 16, relative to the reference radiance: 1e-6 to 0.1.
     pub tolerance: f64,
-    /// 1e-6 to 0.1. Where it is less than the tolerance, that is the solution's alone, and this the image's: rays from the
-    /// points that it shows find what a solution lacks that is there sooner. For few images of little error, which take longer
-    /// each; `None`: the tolerance. There are no such rays where lobes or curved mirrors
-    /// throw sunlight; the error estimate tells.
+    /// Wanted error of images, 1e-6 to 0.1; `None`: `tolerance`. If it is smaller than `tolerance`, the diffuse
+    /// solution is computed to `tolerance` only, and final gathering at the points that an image shows removes the
+    /// rest: faster for one or two precise images, slower for many. There is no final gathering where lobes or curved
+    /// mirrors reflect sunlight onto facets; the error estimate tells.
     pub image_tolerance: Option<f64>,
     /// Light reflected more often does not count; `None`: by tolerance.
     pub max_bounces: Option<u32>,

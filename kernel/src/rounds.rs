@@ -79,7 +79,8 @@ pub fn next_tolerance(asked: f64, last: &Round, before: Option<&Round>, rounds: 
     (!done && step <= ROUND_STEP_MOST && check_tolerance(next).is_ok()).then_some(next)
 }
 
-/// As [`next_tolerance`] after a look at a part of the image: where that is far from what is asked, the rest is not worth its rays.
+/// As [`next_tolerance`] after a look at a part of the image: where that is far from what is asked, the rest is not
+/// worth its rays.
 pub fn at_once(asked: f64, look: &Round, before: Option<&Round>, rounds: u32) -> Option<f64> {
     (look.estimate > REGION_FACTOR * asked).then(|| next_tolerance(asked, look, before, rounds)).flatten()
 }

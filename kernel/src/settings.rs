@@ -58,7 +58,7 @@ impl Settings {
         self.ray_budget.map_or(rows, |budget| rows.within(count, budget))
     }
 
-    /// How far specular chains are followed, and where rays mend what elements are wrong by: an image may take as many for
+    /// How far specular chains are followed, and on which elements final gathering is used: an image may take as many for
     /// that as another round of a coupling that took `rays`.
     pub fn chains(&self, rays: u64) -> ChainSettings {
         let ErrorBudget { solution, image, gathering, .. } = self.budget;
@@ -100,7 +100,8 @@ pub fn unmerged(rows: &RowSettings) -> usize {
     4 * rows.most_rays() as usize
 }
 
-/// Whether planes are compared ([`crate::coupling::plane_sides::PlaneSides`]): closed forms are for rows that keep no directions of the sky.
+/// Whether planes are compared ([`crate::coupling::plane_sides::PlaneSides`]): closed forms are for rows that keep no
+/// directions of the sky.
 pub fn planes(scene: &Scene<'_>, rows: &RowSettings) -> bool {
     !rows.directional && (rows.all || scene.largest_diffuse() > 0.0)
 }
@@ -110,8 +111,8 @@ pub fn probing(rows: &RowSettings) -> u32 {
     (rows.rays / 16).clamp(16, crate::coupling::subdivide::PROBE_RAYS_MOST)
 }
 
-/// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the images' by what
-/// it adds to the element's radiance.
+/// Expected error of the straight sky over an element that circles may leave, irradiance over pi: a part of the images'
+/// by what it adds to the element's radiance.
 pub fn straight_goal(scene: &Scene<'_>, budget: &ErrorBudget) -> f64 {
     budget.straight / scene.largest_diffuse().max(0.1)
 }
@@ -122,14 +123,14 @@ pub fn shape(max_bounces: Option<u32>, bands: usize) -> TableShape {
     TableShape { levels, bands }
 }
 
-/// How the beams that mirrors throw are traced; `None` where the scene has no use for them.
+/// Settings of the beams that mirrors reflect; `None` where the scene has no use for them.
 pub fn beams(scene: &Scene<'_>, sun: &Sun<'_>, settings: &Settings) -> Option<BeamSettings> {
     let Settings { budget, max_bounces, all_irradiances, .. } = *settings;
     let mirrors = |lobe: bool| {
         let is_one = |m: usize| scene.mirror(m) != NO_MIRROR && scene.gloss(m).is_some() == lobe;
         (0..scene.materials()).any(is_one)
     };
-    // lobes show what flat mirrors throw on them
+    // lobes show the sunlight that flat mirrors reflect onto them
     let wanted = scene.largest_diffuse() > 0.0 || all_irradiances || mirrors(true) && mirrors(false);
     if scene.largest_specular() == 0.0 || !wanted || max_bounces == Some(0) {
         return None;
@@ -139,7 +140,8 @@ pub fn beams(scene: &Scene<'_>, sun: &Sun<'_>, settings: &Settings) -> Option<Be
     Some(BeamSettings::new(scene, sun, rays, budget.beam_chains, mirrors))
 }
 
-/// Rays of all beams together, times the images' error: an element that a hundredth of them meets is wrong by n^-3/4 of that.
+/// Rays of all beams together, times the images' error: an element that a hundredth of them meets is wrong by n^-3/4 of
+/// that.
 const BEAM_RAYS: f64 = 100.0;
 
 /// Fewest rays of all beams together: fewer leave elements unmet.

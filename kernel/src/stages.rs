@@ -1,8 +1,8 @@
-//! The driver of the stages: what is computed in which order, over memory that the caller hands in and by whoever runs ranges
-//! of rows for it.
+//! The driver of the stages: what is computed in which order, over memory that the caller hands in and by whoever runs
+//! ranges of rows for it.
 //!
-//! The owning layer runs ranges on its pool, the C library on its caller's threads, tests in a loop ([`Executor`]). All else
-//! is decided here, so that all of them give the same bits.
+//! The owning layer runs ranges on its pool, the C library on its caller's threads, tests in a loop ([`Executor`]). All
+//! else is decided here, so that all of them give the same bits.
 
 mod beams;
 mod geometry;

@@ -107,7 +107,7 @@ fn asking(sky: &'static Asked) -> impl Fn(Vec2) -> f64 + Sync {
     move |direction| sky.radiance(direction)
 }
 
-/// A sky that is not looked at.
+/// Radiance by direction of a scene without a sky: 0.
 const DARK: RadianceOf<'static> = &|_| 0.0;
 
 /// The caller's light, its arrays still the caller's.

@@ -54,8 +54,8 @@ pub const BLIK_PLANE_POLYLINE: i32 = 1;
 pub const BLIK_PLANE_POLYGON: i32 = 2;
 
 /// A body of the plane model: a circle, or segments whose fronts are on the right of their direction (counter-clockwise
-/// for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners. Arrays of
-/// it have a stride: it may grow.
+/// for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners.
+/// Arrays of it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_plane_body {

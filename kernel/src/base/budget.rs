@@ -43,8 +43,8 @@ pub struct ErrorBudget {
     pub chains: f64,
     /// Error of a lobe's radiance from which on it takes more rays.
     pub lobes: f64,
-    /// Error of an element from which on points gather for themselves, in `image`; views change it with the rays that they may
-    /// take.
+    /// Error of an element from which on points gather for themselves, in `image`; views change it with the rays that
+    /// they may take.
     pub gathering: f64,
     /// Root mean square error by sampling pixels.
     pub pixels: f64,

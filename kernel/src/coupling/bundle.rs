@@ -1,9 +1,9 @@
 //! Bundles: a row's escapes to the sky in little memory. Most rays of a row count alike and differ in their directions
 //! alone.
 //!
-//! While a row grows an escape is a [`Record`]; in a finished row rays of the same path, weight, gradient and half differences
-//! are a bundle, and each costs the four bytes of its direction. Bundles stand where the row's records did: 32-bit
-//! words, each bundle a head and its directions, zeros to the end of the last record.
+//! While a row grows an escape is a [`Record`]; in a finished row rays of the same path, weight, gradient and half
+//! differences are a bundle, and each costs the four bytes of its direction. Bundles stand where the row's records did:
+//! 32-bit words, each bundle a head and its directions, zeros to the end of the last record.
 
 use super::Record;
 use crate::base::arena;

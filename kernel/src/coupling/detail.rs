@@ -19,13 +19,13 @@ pub(crate) struct DetailSearch {
     pub small: f64,
     /// Distance from the triangle up to which they are near.
     pub reach: f64,
-    /// Facets that are looked at.
+    /// Most facets that are examined.
     pub most: u32,
 }
 
 impl DetailSearch {
-    /// Whether small facets stand near the triangle; where more than the most would have to be looked at, `many`.
-    // apart, so that its stack is no burden to rays
+    /// Whether small facets stand near the triangle; where more than the most would have to be examined, `many`.
+    // not inlined: keeps it out of the stack frame of rays
     #[inline(never)]
     pub fn finds(&self, bvh: &Bvh<'_>, many: bool) -> bool {
         let [a, b, c] = self.corners;

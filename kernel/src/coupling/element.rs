@@ -1,7 +1,8 @@
-//! Elements: facets cut into quarters as [`crate::coupling::subdivide`] decides, on each of which diffuse light varies linearly.
+//! Elements: facets cut into quarters as [`crate::coupling::subdivide`] decides, on each of which diffuse light varies
+//! linearly.
 //!
-//! The cut depends on geometry, materials and tolerance, never on the light. An unknown of the linear system
-//! is one side of one element: unknown = element * sides + side.
+//! The cut depends on geometry, materials and tolerance, never on the light. An unknown of the linear system is one
+//! side of one element: unknown = element * sides + side.
 
 mod bake;
 

@@ -3,16 +3,16 @@
 //! Each element side sends cosine-distributed rays from points spread over its area, as many from each of the four
 //! triangles that its edges' middles cut off: what those three at the corners see makes the gradient. A ray's first
 //! hit, and every diffuse facet that its mirror chain meets, is a target; where the chain leaves the object, the sky
-//! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four
-//! dimensions: n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
+//! is. The error of a row's entry F is about sqrt(F (1 - F)) n^-2/3 for n rays (the integrand jumps in four dimensions:
+//! n^-5/8 at worst); the sum of targets, black backs and sky is 1 exactly, since each ray ends somewhere.
 //!
-//! What nothing hides ([`crate::coupling::plane_sides`]) is entered in closed form instead (`exact.rs`) where that costs less:
-//! rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's share of the
-//! hemisphere, which is known.
+//! What nothing hides ([`crate::coupling::plane_sides`]) is entered in closed form instead (`exact.rs`) where that
+//! costs less: rays that meet it first go on from there alone, and both kinds of rays together stand for their kind's
+//! share of the hemisphere, which is known.
 //!
-//! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand
-//! for what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside
-//! a body, and counts or not.
+//! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand for
+//! what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside a
+//! body, and counts or not.
 
 use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::mirror_path::{MIRRORS_MOST, STRAIGHT};
@@ -352,7 +352,7 @@ impl Tracer<'_, '_> {
 
     /// The row with entries in closed form to what nothing hides, and rays for the rest; false where rays alone cost
     /// less, or where parts of the element may lie inside a body.
-    // apart, as the next: what one needs does not burden the stack of the other
+    // not inlined, as the next: neither enlarges the stack frame of the other
     #[inline(never)]
     fn closed(
         &mut self,
@@ -602,8 +602,8 @@ impl Tracer<'_, '_> {
         }
     }
 
-    /// Counts the first hit of a ray, and adds the facet where it is not proven visible and entered in closed form. The inner
-    /// `None` where the ray ends there: inside a body, or on a black back.
+    /// Counts the first hit of a ray, and adds the facet where it is not proven visible and entered in closed form. The
+    /// inner `None` where the ray ends there: inside a body, or on a black back.
     #[inline]
     fn first_hit(
         &mut self,
@@ -680,9 +680,9 @@ impl Tracer<'_, '_> {
         }
     }
 
-    /// The path with the mirror at `surface` added. The inner `None` where the chain ends: there is no mirror, or what is left
-    /// of the light is below the cutoff or beyond the largest number of mirrors; that rest is counted, and added as if the
-    /// chain went on as it went so far.
+    /// The path with the mirror at `surface` added. The inner `None` where the chain ends: there is no mirror, or what
+    /// is left of the light is below the cutoff or beyond the largest number of mirrors; that rest is counted, and
+    /// added as if the chain went on as it went so far.
     #[inline]
     fn next_mirror(
         &mut self,

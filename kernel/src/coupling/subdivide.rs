@@ -108,8 +108,8 @@ pub struct Level<'a> {
 /// the ground that they stand on.
 const COUNTED_AREA_RATIO: f64 = 8.0;
 
-/// The area over which the mean square error is taken, that of all facets: each adds up to [`COUNTED_AREA_RATIO`] times what those up to
-/// its size, to a factor of 2, add.
+/// The area over which the mean square error is taken, that of all facets: each adds up to [`COUNTED_AREA_RATIO`] times
+/// what those up to its size, to a factor of 2, add.
 fn counted_area(areas: &[f64]) -> f64 {
     const SIZES: usize = 64;
     let largest = areas.iter().fold(0.0, |a: f64, &b| a.max(b));
@@ -345,7 +345,7 @@ struct Probe<'a> {
     traced: u64,
 }
 
-/// Facets that are looked at together, and by how much each is brighter than the sky.
+/// Facets whose form factors are computed together, and by how much each is brighter than the sky.
 struct Together {
     block: TriangleBlock,
     brightness: [f64; TRIANGLE_LANES],
@@ -391,7 +391,7 @@ impl Probe<'_> {
     fn side(&mut self, node: &Node, side: usize, expected: f64) -> f64 {
         let facet = node.facet as usize;
         let normal = self.scene.side_normal(facet, side);
-        // only the points differ: surfaces of their own would burden the stack
+        // only the points differ: surfaces of their own would enlarge the stack frame
         let points = core::array::from_fn(|point| {
             let (a, b) = middle(point);
             let (u, v) = Path(node.path).out_of(a, b);
@@ -431,7 +431,7 @@ impl Probe<'_> {
     }
 
     /// Unevenness without rays, where nothing hides anything and rays would cost more.
-    // apart: its triangles do not burden the stack of the rays
+    // not inlined: keeps its triangles out of the stack frame of the rays
     #[inline(never)]
     fn closed(&self, node: &Node, side: usize, points: &[Vec3; PROBE_POINTS]) -> Option<f64> {
         let facet = node.facet as usize;
@@ -447,7 +447,7 @@ impl Probe<'_> {
     }
 
     /// The unevenness of a triangle whose visible facets are all proven, by closed forms.
-    // apart: its sums do not burden the stack of the proof
+    // not inlined: keeps its sums out of the stack frame of the proof
     #[inline(never)]
     fn closed_residuals(
         &self,

@@ -74,12 +74,12 @@ pub fn visible_point_to_polygon<'o>(
     Ok(sum.min(1.0))
 }
 
-/// Form factor from the convex planar polygon `a` to what of `b` the opaque triangles `occluders` leave visible:
-/// the mean over a of [`visible_point_to_polygon`], one-sided as [`polygon_to_polygon`].
+/// Form factor from the convex planar polygon `a` to what of `b` the opaque triangles `occluders` leave visible: the
+/// mean over a of [`visible_point_to_polygon`], one-sided as [`polygon_to_polygon`].
 ///
-/// Gauss points on a, whose patches are halved where two resolutions differ, until the expected error (which
-/// comes back, at least a quarter of it) is below about `tolerance` (absolute, > 0). Outlines of shadows bend the integrand: the cost
-/// grows as the tolerance to the power -1/2. In [0, [`polygon_to_polygon`]]. `scratch` as there.
+/// Gauss points on a, whose patches are halved where two resolutions differ, until the expected error (which comes
+/// back, at least a quarter of it) is below about `tolerance` (absolute, > 0). Outlines of shadows bend the integrand:
+/// the cost grows as the tolerance to the power -1/2. In [0, [`polygon_to_polygon`]]. `scratch` as there.
 pub fn visible_polygon_to_polygon(
     a: &[Vec3],
     b: &[Vec3],

@@ -68,8 +68,8 @@ const GRADED: u32 = 2;
 const PAPER: u32 = 3;
 
 impl Fork {
-    /// The lobe around `state.direction` that is met at `hit`, `state.lobes` counting it. `sweep` finds the spans that a split
-    /// lobe sees, and their number, where there is memory for them.
+    /// The lobe around `state.direction` that is met at `hit`, `state.lobes` counting it. `sweep` finds the spans that
+    /// a split lobe sees, and their number, where there is memory for them.
     pub(super) fn new(
         scene: &PlaneScene<'_>,
         hit: &Hit,

@@ -35,7 +35,8 @@ pub struct Report {
 /// Solves a scene and hands the solution, the report and working memory to `with`.
 ///
 /// # Errors
-/// Those of the stages; [`Error::Range`] where a setting is out of range; [`Error::Diverges`] where a closed part of the scene reflects all light.
+/// Those of the stages; [`Error::Range`] where a setting is out of range; [`Error::Diverges`] where a closed
+/// part of the scene reflects all light.
 pub fn solve<R>(
     input: &PlaneInput<'_>,
     light: &Light<'_>,

@@ -275,9 +275,9 @@ impl<'m> PlaneScene<'m> {
     /// have none of their own.
     ///
     /// # Errors
-    /// [`Error::Range`] of the tolerance; every fault of the input with its index ([`Error::Body`], [`Error::MaterialRange`],
-    /// [`Error::ReflectanceSum`], [`Error::MaterialOutOfRange`], [`Error::NoFacets`], [`Error::NoMaterials`]);
-    /// [`Error::BufferTooSmall`].
+    /// [`Error::Range`] of the tolerance; every fault of the input with its index ([`Error::Body`],
+    /// [`Error::MaterialRange`], [`Error::ReflectanceSum`], [`Error::MaterialOutOfRange`], [`Error::NoFacets`],
+    /// [`Error::NoMaterials`]); [`Error::BufferTooSmall`].
     pub fn new(
         input: &PlaneInput<'_>,
         basis: Basis,

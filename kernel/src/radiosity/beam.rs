@@ -1,11 +1,11 @@
 //! Beams: sunlight that mirrors reflect onto diffuse facets.
 //!
-//! Each side of a mirror facet that faces the sun sends a share of its sunlight along mirror chains; what
-//! arrives at a diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row =
-//! facet * sides + side of the mirror, target = unknown, weight = irradiance per unit of the sun's normal
-//! irradiance. Energy is conserved: the weights times the targets' areas add up to the flux that leaves.
-//! A record also tells where the sun seems to stand ([`crate::radiosity::sun_image`]), so that images need not take these means.
-//! Error of an element that receives n of the rays: about n^-3/4 of its value.
+//! Each side of a mirror facet that faces the sun sends a share of its sunlight along mirror chains; what arrives at a
+//! diffuse facet is irradiance of the element it meets. Rows have the coupling's layout: row = facet * sides + side of
+//! the mirror, target = unknown, weight = irradiance per unit of the sun's normal irradiance. Energy is conserved: the
+//! weights times the targets' areas add up to the flux that leaves. A record also tells where the sun seems to stand
+//! ([`crate::radiosity::sun_image`]), so that images need not take these means. Error of an element that receives n of
+//! the rays: about n^-3/4 of its value.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -36,7 +36,7 @@ pub struct BeamSettings {
     pub mirrors: u32,
 }
 
-/// Fewest rays from one facet toward the sun: what small mirrors throw is met at all.
+/// Fewest rays from one facet toward the sun: small mirrors reflect some.
 const FACET_BEAM_RAYS_FEWEST: f64 = 16.0;
 
 /// Most rays from one facet toward the sun: its sequence has 2^16 points.

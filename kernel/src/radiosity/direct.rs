@@ -2,7 +2,7 @@
 //! mirrors. It is the right-hand side of eq. (12).
 //!
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
-//! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors throw.
+//! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors reflect.
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
@@ -138,8 +138,8 @@ impl LaneTask for SkyRows<'_, '_> {
     }
 }
 
-/// Takes off what is blocked or adds what is open, where no `scale` says that it is known, and adds what escapes by way of mirrors; `sum` has room for a value
-/// of each band.
+/// Takes off what is blocked or adds what is open, where no `scale` says that it is known, and adds what escapes by way
+/// of mirrors; `sum` has room for a value of each band.
 #[inline(always)]
 fn add_escapes<L: Lanes>(
     row: &RowView<'_>,

@@ -85,7 +85,7 @@ pub struct SolutionSize {
     pub shape: TableShape,
     /// Unknowns.
     pub unknowns: usize,
-    /// Places for images of the sun; 0 where no mirror throws sunlight.
+    /// Places for images of the sun; 0 where no mirror reflects sunlight.
     pub places: usize,
     /// Whether outlines tell the straight sky.
     pub straight: bool,

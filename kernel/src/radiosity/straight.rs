@@ -24,7 +24,7 @@ const FEW_POINTS: f64 = 8.0 / 3.0;
 /// slope: a shadow's edge along a narrow facet had a twelfth of it, where the points showed a hundredth of that.
 const UNSEEN_SLOPE: f64 = 0.1;
 
-/// Depth of the smallest quarters that are looked at. Where irradiances are asked for, 64 points, as rows have rays from;
+/// Depth of the smallest quarters that are evaluated. Where irradiances are asked for, 64 points, as rows have rays from;
 /// images average over elements: 16 points took the airplane's elements twice the seconds and left its error.
 pub fn deepest(all_irradiances: bool) -> u32 {
     if all_irradiances { 3 } else { 1 }
@@ -56,8 +56,8 @@ pub const BY_ROWS: f32 = -1.0;
 /// The sky that elements see straight.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Straight<'a> {
-    /// Of each unknown mean irradiance and its two gradients, one value per band each, and the share of its hemisphere that is
-    /// blocked, with its gradients; or nothing.
+    /// Of each unknown mean irradiance and its two gradients, one value per band each, and the share of its hemisphere
+    /// that is blocked, with its gradients; or nothing.
     pub values: &'a [f64],
     /// Expected squared error of that linear function over each element, over pi and relative to the reference radiance; or
     /// [`BY_ROWS`].
@@ -74,8 +74,8 @@ impl<'a> Straight<'a> {
         (variance >= 0.0).then_some((values, f64::from(variance)))
     }
 
-    /// By what a row's entries are to be multiplied so that they fill what is known to be blocked: then all that it sees comes
-    /// to the whole hemisphere.
+    /// By what a row's entries are to be multiplied so that they fill what is known to be blocked: then all that it
+    /// sees comes to the whole hemisphere.
     #[inline]
     pub fn scale(&self, unknown: usize, bands: usize, row: &Row) -> f64 {
         match self.of(unknown, bands) {
@@ -134,7 +134,7 @@ impl<'a> Straight<'a> {
 /// What is blocked of a hemisphere, mean and gradients; and by which gradients a row's entries fall short of it.
 pub type Blocked = ([f64; 3], [f64; 2]);
 
-/// How outlines are to be looked at for a sky; `None` where they do not tell.
+/// Which function of direction outlines integrate for a sky; `None` where they cannot.
 pub fn basis(bvh: &Bvh<'_>, sky: &Sky<'_>) -> Option<Basis> {
     if bvh.outlines().is_empty() || !sky.is_linear() {
         return None;
@@ -165,7 +165,7 @@ pub struct Looking<'a> {
     pub reference: &'a [f64],
     /// Expected error of irradiance over pi to reach, relative to the largest radiance.
     pub goal: f64,
-    /// Depth of the smallest quarters that are looked at ([`deepest`]).
+    /// Depth of the smallest quarters that are evaluated ([`deepest`]).
     pub deepest: u32,
 }
 

@@ -155,8 +155,8 @@ impl Region {
         Region::new([0, 1].map(|k| own[k] + share * (middle[k] - own[k])), both)
     }
 
-    /// Whether lines through the ball of radius `reach` about a point, within an angle of sine `spread` of the axis, may meet
-    /// the disc.
+    /// Whether lines through the ball of radius `reach` about a point, within an angle of sine `spread` of the axis,
+    /// may meet the disc.
     #[inline]
     fn may_meet(self, axis: Vec3, point: Vec3, reach: f64) -> bool {
         let (middle, radius) = self.disc();
@@ -187,7 +187,8 @@ const IMAGE_DIRECTION_BITS: u32 = 31;
 /// The largest coordinate.
 const LAST_STEP: u64 = (1 << IMAGE_DIRECTION_BITS) - 1;
 
-/// Directions within [`SEEN_DISTANCE_MOST`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or more.
+/// Directions within [`SEEN_DISTANCE_MOST`], 2e-7 rad, differ by less in both coordinates, whose steps are 5e-10 rad or
+/// more.
 const NEAR_STEPS: i64 = 512;
 
 /// A direction in 63 bits, to 2e-9 rad; never 0.
@@ -203,7 +204,7 @@ pub fn unpack(packed: u64) -> Vec3 {
 /// The images that each side of a facet sees, and what they give its elements on the mean.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SunImages<'a> {
-    /// The lists of all sides of facets ([`places`]); empty where nothing throws sunlight.
+    /// The lists of all sides of facets ([`places`]); empty where nothing reflects sunlight.
     pub slots: &'a [u64],
     /// Irradiance by light that can be computed at every point: for each unknown and level, one value per band; of sides
     /// with too many images, too.
@@ -329,8 +330,8 @@ impl SunImagesMut<'_> {
         self.slots.set(sides, used as u64 + 1);
     }
 
-    /// Notes where on its element a record's light falls; `irradiance` is that of each band for a weight of 1, `visible_share` the
-    /// part of the element that is not inside a body.
+    /// Notes where on its element a record's light falls; `irradiance` is that of each band for a weight of 1,
+    /// `visible_share` the part of the element that is not inside a body.
     pub fn spread(
         &mut self,
         unknown: usize,
@@ -362,7 +363,7 @@ impl<'a> SunImages<'a> {
     /// The images of a mesh with `sides` sides of facets, and the means of `unknowns` unknowns.
     ///
     /// # Errors
-    /// [`Error::Length`] for slices of other lengths; both may be empty where nothing throws sunlight.
+    /// [`Error::Length`] for slices of other lengths; both may be empty where nothing reflects sunlight.
     pub fn new(
         slots: &'a [u64],
         reflected_irradiance: &'a [f64],
@@ -400,7 +401,8 @@ impl<'a> SunImages<'a> {
         Nearby { list: List::of(self.slots, sides, side), number: 0, point, reach }
     }
 
-    /// Whether [`SunImages::of`] gives all images that one of `sides` sides of facets may see; else their light stays a mean.
+    /// Whether [`SunImages::of`] gives all images that one of `sides` sides of facets may see; else their light stays a
+    /// mean.
     #[inline]
     pub fn are_known(&self, side: usize) -> bool {
         self.slots.is_empty() || self.slots.at(side) != SIDE_IMAGES_TOO_MANY

@@ -1,4 +1,5 @@
-//! Beams that mirrors throw: their rows in pieces of scratch memory, added to the direct light in the order of the rows.
+//! Beams, sunlight that mirrors reflect: their rows in pieces of scratch memory, added to the direct light in the order
+//! of the rows.
 
 use super::light::{Lighting, SHARES, Scratch, beam_settings};
 use super::{Executor, block_rows};
@@ -23,7 +24,8 @@ pub struct Beams {
 }
 
 impl Beams {
-    /// Adds the sunlight that mirrors throw, of all rows that are left. `memory`, of any content, is split among the lanes.
+    /// Adds the sunlight that mirrors reflect onto elements, of all rows that are left. `memory`, of any content, is
+    /// split among the lanes.
     ///
     /// # Errors
     /// [`Error::BufferTooSmall`] where no row fits: to be called again with as many bytes as that says.

@@ -47,7 +47,7 @@ pub struct Sizes {
     orders: usize,
     /// Bytes of a few rows of beams.
     beams: usize,
-    /// Bytes in which the straight sky is looked at.
+    /// Bytes in which the straight sky of elements is evaluated.
     lookers: usize,
 }
 
@@ -59,7 +59,7 @@ pub struct Scratch<'m> {
     pub(super) orders: &'m mut [f64],
     pub(super) own: &'m mut [Own],
     pub(super) carried: &'m mut [f32],
-    /// Where on elements light falls that may stay a mean; of no length where no mirror throws sunlight.
+    /// Where on elements light falls that may stay a mean; of no length where no mirror reflects sunlight.
     pub(super) spread: &'m mut [f32],
     /// Bands, as bits, that emission alone lights and for which the caller gave no reference radiance: it follows from the
     /// solution.
@@ -67,7 +67,7 @@ pub struct Scratch<'m> {
     pub(super) lookers: &'m mut [u8],
 }
 
-/// How a scene's mirrors throw a light's sun; `None` where there are no such beams.
+/// Settings of the beams that a scene's mirrors reflect of a light's sun; `None` where there are no such beams.
 pub(super) fn beam_settings(
     scene: &Scene<'_>,
     light: &Light<'_>,

@@ -95,7 +95,7 @@ impl ChainSettings {
         let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
             if solution > image { GATHER_ALL } else { GATHER_MANY }
         } else {
-            // most of it would have to be mended, for which a finer solution costs less: what a solution leaves at worst
+            // most elements would need final gathering, and a finer solution costs less: only the worst do
             self.gather * (solution / image).max(1.0)
         };
         let area = camera.pixel_area();
@@ -304,7 +304,7 @@ impl RaySample {
     }
 }
 
-/// How a ray is followed: which one it is, and what is known of what stands before facets.
+/// How a ray is followed: which sample it is, and the occluders of facets that are known.
 struct Mode<'w, 'm> {
     sample: RaySample,
     occluders: &'w mut OccluderCache<'m>,
@@ -731,7 +731,8 @@ impl Solved<'_> {
         }
     }
 
-    /// The chain leaves the object: sky, and the sun's disc. Apart: its radiances do not burden the stack of what goes on.
+    /// The chain leaves the object: sky, and the sun's disc. Not inlined: keeps its radiances out of the stack frame of
+    /// the chain.
     #[inline(never)]
     fn escape(&self, state: &PathState<'_>, terms: &mut Terms) {
         let bands = self.shape.bands;
@@ -827,8 +828,8 @@ impl Solved<'_> {
         }
     }
 
-    /// The level of the irradiance table that counts for a facet behind `mirrors` mirrors; `None` where its reflection is one
-    /// too many.
+    /// The level of the irradiance table that counts for a facet behind `mirrors` mirrors; `None` where its reflection
+    /// is one too many.
     #[inline]
     fn level(&self, mirrors: u32) -> Option<usize> {
         let level = match self.settings.max_bounces {

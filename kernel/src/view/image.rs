@@ -422,8 +422,8 @@ impl<'a, 's> Painter<'a, 's> {
         }
     }
 
-    /// Computes the centres of a row: `each` takes the terms ([`Painter::terms`]) of each range of pixels, of one pixel or of
-    /// many that show the background.
+    /// Computes the centres of a row: `each` takes the terms ([`Painter::terms`]) of each range of pixels, of one pixel
+    /// or of many that show the background.
     #[inline(never)]
     fn line(
         &mut self,
@@ -550,10 +550,10 @@ impl<'a, 's> Painter<'a, 's> {
         Measure { bands: self.solved.shape.bands, reference: self.solved.reference }
     }
 
-    /// Has the elements of a pixel that rays mend mended about its middle, rather than where lines or scattered rays first
-    /// meet them.
+    /// Uses final gathering about a pixel's middle first, so that its elements are gathered there, rather than where
+    /// lines or scattered rays first meet them.
     #[inline(never)]
-    fn look_about(&mut self, row: isize, column: isize) {
+    fn gather_about_middle(&mut self, row: isize, column: isize) {
         self.pixel.work.gathered.forget();
         for (x, y) in [(0.5, 0.5), (0.25, 0.25), (0.75, 0.75), (0.25, 0.75), (0.75, 0.25)] {
             let ray = self.camera.ray(column as f64 + x, row as f64 + y);
@@ -574,7 +574,7 @@ impl<'a, 's> Painter<'a, 's> {
     fn refine(&mut self, target: &mut Target<'_>, index: usize, row: isize, column: isize, goal: f64) -> f64 {
         self.tally.refined += 1;
         if self.solved.gathers() {
-            self.look_about(row, column);
+            self.gather_about_middle(row, column);
         }
         let mut sampled = false;
         let measure = self.measure();

@@ -225,8 +225,8 @@ impl<'m> Items<'m> {
     }
 }
 
-/// Depths at cosines down to [`RASTER_COSINE_GRAZING`], those drawn and those of hits, are off by less than 2^-40 of the farthest
-/// distance from the eye; depths closer than this part of it are not told apart.
+/// Depths at cosines down to [`RASTER_COSINE_GRAZING`], those drawn and those of hits, are off by less than 2^-40 of
+/// the farthest distance from the eye; depths closer than this part of it are not told apart.
 const RASTER_DEPTH_ROUNDING: f64 = 1.0 / (1u64 << 34) as f64;
 
 /// Least cosine of facets that are drawn; others are left to rays.

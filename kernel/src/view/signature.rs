@@ -299,7 +299,7 @@ impl Tracer<'_> {
     }
 
     /// Adds what a row shows, piece by piece without gaps: rays a cell apart or less stand for equal parts of each.
-    // apart: it does not burden the stack of the search for facets on a line, nor that its own
+    // not inlined: keeps it out of the stack frame of the search for facets on a line, and that out of its own
     #[inline(never)]
     fn spans(&mut self, row: usize, mut spans: impl Iterator<Item = Span> + Clone, sums: &mut Sums) {
         // another place within the parts of each row: facets may be as regular as the cells

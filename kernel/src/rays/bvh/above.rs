@@ -4,7 +4,7 @@ use super::path_stack::{EMPTY_STACK, push, top};
 use super::{Bvh, LEAF_CHILD, PAIR};
 use crate::base::math::Vec3;
 
-/// See [`Bvh::rises_above`]. Apart: its stack is no burden to what the caller does next.
+/// See [`Bvh::rises_above`]. Not inlined: its stack frame ends before the caller goes on.
 #[inline(never)]
 pub(super) fn rises_above(bvh: &Bvh<'_>, normal: Vec3, height: f64) -> bool {
     let n = normal.to_array();

@@ -48,8 +48,8 @@ impl External<'_> {
         self.first(tree, ray, facet[0])
     }
 
-    /// Whether rays, at most [`INTERSECTOR_RAYS_MOST`], meet anything: 1 or 0, to `hits`. Where the tracer names facets, those that the ray
-    /// does not meet are left to `tree`.
+    /// Whether rays, at most [`INTERSECTOR_RAYS_MOST`], meet anything: 1 or 0, to `hits`. Where the tracer names
+    /// facets, those that the ray does not meet are left to `tree`.
     #[inline(never)]
     fn any_batch(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [u32]) {
         if self.tracer.any(rays, hits) {

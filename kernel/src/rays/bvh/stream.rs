@@ -47,7 +47,7 @@ fn search(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>], any: bool) {
     if traverse::is_short(bvh) { short(bvh, rays, hits, any) } else { deep(bvh, rays, hits, any) }
 }
 
-/// Apart, so that its stack is no burden to what the caller does with the hits.
+/// Not inlined: its stack frame ends before the caller uses the hits.
 #[inline(never)]
 fn short(bvh: &Bvh, rays: &[Ray], hits: &mut [Option<Hit>], any: bool) {
     simd::run_lanes(bvh.isa, Search::<STACK_SHORT> { bvh, rays, hits, any });

@@ -108,7 +108,7 @@ impl Cie {
     /// | less | 32 x 32 | 2e-8 | 1e-7 |
     ///
     /// Each point costs two exponentials and an arc cosine: 10 us a normal for 2e-3, 100 us for 1e-6.
-    // apart: its table does not burden the stack of other skies
+    // not inlined: keeps its table out of the stack frame of other skies
     #[inline(never)]
     pub(super) fn irradiance(&self, normal: Vec3, up: Vec3, relative_error: f64) -> f64 {
         let (polar, around) = match relative_error {

@@ -1,4 +1,5 @@
-//! A sky's input as a record of numbers, beside its arrays: the form in which baked blocks keep skies and C callers give them.
+//! A sky's input as a record of numbers, beside its arrays: the form in which baked blocks keep skies and C callers
+//! give them.
 
 use super::{SkyInput, SkyModel, SkyTable};
 use crate::base::arena::plain_struct;

@@ -333,7 +333,7 @@ impl<'a> Table<'a> {
     /// single bright sample gives a plane that faces it, the error so left is at most 2e-4 (4 points) or 1e-5
     /// (16), measured on 8 x 16 samples with all normals, and falls with the second power of the cells' size.
     /// Time in proportion to the number of samples, about 10 ns each.
-    // apart: its rings do not burden the stack of other skies
+    // not inlined: keeps its rings out of the stack frame of other skies
     #[inline(never)]
     pub(super) fn irradiance(&self, normal: Vec3, relative_error: f64, out: &mut [f64]) {
         let points = if relative_error >= 1e-4 && self.rows >= 8 { 4 } else { 16 };
@@ -355,7 +355,7 @@ impl<'a> Table<'a> {
             for gap in 0..=self.rows {
                 let rows = [gap.saturating_sub(1), gap.min(self.rows - 1)];
                 let (top, bottom) = self.gap(gap);
-                // one panel at a time: all rings of a gap would burden the stack
+                // one panel at a time: all rings of a gap would enlarge the stack frame
                 let bounds = [top, turn.min(top).max(bottom), (-turn).min(top).max(bottom), bottom];
                 for panel in bounds.windows(2) {
                     rings.fill((top, bottom), panel, across, height, points);

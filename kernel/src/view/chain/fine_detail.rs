@@ -13,8 +13,8 @@ use crate::rays::surface::Surface;
 
 /// Error of irradiance over pi that is assumed beside fine detail, relative to the reference radiance.
 ///
-/// A shadow of a thin object changes the irradiance by about this much. `cargo run --release --example calibrate` compares the
-/// estimates with true errors.
+/// A shadow of a thin object changes the irradiance by about this much. `cargo run --release --example calibrate`
+/// compares the estimates with true errors.
 pub(super) const FINE_DETAIL_ERROR: f64 = 0.1;
 
 /// Area of an element, in pixels, above which an image may resolve what the element's rays have missed.

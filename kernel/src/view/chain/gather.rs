@@ -158,7 +158,7 @@ impl Gathered {
         self.skies.count = 0;
     }
 
-    /// Whether no element of the pixel was mended yet.
+    /// Whether final gathering was used on no element of the pixel yet.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.count == 0
@@ -226,8 +226,8 @@ const SUNLIT_SPREAD: f64 = 2.5;
 /// [`RAY_SPREAD_MOST`].
 const LEAST_VARIED: f64 = 0.3;
 
-/// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is met: of
-/// three tenths of the hemisphere.
+/// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is
+/// met: of three tenths of the hemisphere.
 pub(super) fn spread(reflected: f64) -> f64 {
     clamp(3.0 * reflected, RAY_SPREAD_LEAST, RAY_SPREAD_MOST)
 }
@@ -261,7 +261,7 @@ pub(super) struct GatherPoint<'a> {
 
 impl Solved<'_> {
     /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
-    /// holds: not what narrow lobes and curved mirrors throw of the sun, nor flat ones where there are too many.
+    /// holds: not the sunlight that narrow lobes and curved mirrors reflect, nor flat ones where there are too many.
     #[inline]
     pub(super) fn wants_rays(&self, surface: &Surface, weight: f64, variance: f64) -> bool {
         let most = self.settings.gather * self.settings.budget.image;
@@ -281,7 +281,7 @@ impl Solved<'_> {
         self.images.are_known(side)
     }
 
-    /// Whether rays from points find what mirrors throw of the sun beside its images.
+    /// Whether rays from points find the sunlight that mirrors reflect beside its images.
     fn finds_thrown_sun(&self) -> bool {
         let mut materials = 0..self.scene.materials();
         self.scene.largest_specular() == 0.0

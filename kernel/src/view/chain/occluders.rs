@@ -49,7 +49,8 @@ plain_struct! {
         pub side: u32,
         /// [`RayKind::number`]; 0: an empty place.
         pub kind: u32,
-        /// Facets that may be in the way, or [`OCCLUDERS_TOO_MANY`]; toward an image of the sun: mirrors in the way that may show it.
+        /// Facets that may be in the way, or [`OCCLUDERS_TOO_MANY`]; toward an image of the sun: mirrors in the way
+        /// that may show it.
         pub count: u32,
         /// Which.
         pub facets: [u32; OCCLUDERS_MOST],
@@ -105,8 +106,8 @@ pub struct OccluderCache<'m> {
     pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
     parallel: bool,
-    /// Least projected area of a facet whose occluders along the mirror direction are collected: the few rays of smaller ones
-    /// cost less.
+    /// Least projected area of a facet whose occluders along the mirror direction are collected: the few rays of
+    /// smaller ones cost less.
     least_mirror: f64,
     /// Least area of a facet whose occluders toward the sun are collected.
     least_sun: f64,

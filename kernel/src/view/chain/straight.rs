@@ -114,7 +114,8 @@ impl<'a> Solved<'a> {
         open
     }
 
-    /// Whether the linear function over an element of this expected squared error is too little for a point of such a weight.
+    /// Whether the linear function over an element of this expected squared error is too little for a point of such a
+    /// weight.
     #[inline]
     pub(super) fn wants_look(&self, weight: f64, variance: f64) -> bool {
         let most = OPEN_SKY_ERROR_SHARE * self.settings.budget.image;

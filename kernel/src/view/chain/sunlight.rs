@@ -147,7 +147,7 @@ impl Solved<'_> {
         largest
     }
 
-    /// Adds to `to` what flat mirrors throw of the sun on a point: rays toward each of its images.
+    /// Adds to `to` the sunlight that flat mirrors reflect onto a point: rays toward each of its images.
     #[inline(never)]
     pub(super) fn add_images(
         &self,

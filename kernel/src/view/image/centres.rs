@@ -86,7 +86,8 @@ impl<'m> Centres<'m> {
         self.number(place, Number::Sampled) > 0.0
     }
 
-    /// Difference from the neighbours, relative to the reference radiance; infinite where the pixel is to be sampled, or was.
+    /// Difference from the neighbours, relative to the reference radiance; infinite where the pixel is to be sampled,
+    /// or was.
     #[inline]
     pub(super) fn unevenness(&self, place: usize) -> f64 {
         self.number(place, Number::Unevenness)

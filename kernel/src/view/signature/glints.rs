@@ -290,7 +290,7 @@ impl Glints<'_, '_> {
                 sum.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += value * p);
             }
             count += 1;
-            // what brings little is looked at once
+            // a part that brings little takes one ray
             if count == 1 && scale * value * part.share() * seen.area > faint {
                 goal = QUADRATIC_POINTS.len() as u32;
             }
