@@ -806,13 +806,15 @@ impl Solved<'_> {
         // a ray from a point, or of a lobe
         let counts_signs = state.gathered.is_none();
         let gathered = state.gathered.as_deref_mut();
-        let arriving = self.arriving(&point, state.far, (gathered, state.images), mode, path);
-        let open = arriving.open.as_ref();
+        let mut open = None;
+        let (correction, variance) =
+            self.beyond_element(&point, state.far, (gathered, state.images), mode, path, &mut open);
+        let open = open.as_ref();
         for (band, ((to, throughput), rho)) in
             to.iter_mut().zip(state.throughput.iter()).zip(diffuse).enumerate()
         {
             let mut irradiance = held(values, bands, local, open, band);
-            irradiance = (irradiance + arriving.correction.at(band)).max(0.0);
+            irradiance = (irradiance + correction.at(band)).max(0.0);
             irradiance += open.map_or(0.0, |open| open.irradiance.at(band)) + reflected_irradiance.at(band);
             if let Some(sun) = sun {
                 irradiance += sunlit * sun.irradiance(band);
@@ -821,9 +823,9 @@ impl Solved<'_> {
             let share = throughput * rho;
             *to += share * FRAC_1_PI * irradiance;
         }
-        path.variance += weight * weight * arriving.variance;
+        path.variance += weight * weight * variance;
         if counts_signs {
-            let error = weight * sqrt(arriving.variance);
+            let error = weight * sqrt(variance);
             path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
         }
     }
@@ -840,17 +842,20 @@ impl Solved<'_> {
         Some(level.min(self.shape.levels.saturating_sub(1)))
     }
 
-    /// What is known at a point beyond its element's linear function: the straight sky, where the element's leaves too much
-    /// of it, and final gathering, where the element's expected error is too large.
-    #[inline(always)]
-    fn arriving<'g>(
-        &'g self,
+    /// What is known at a point beyond its element's linear function: `open`, the straight sky, where the element's leaves
+    /// too much of it; irradiance that final gathering adds, one value per band, where the element's expected error is too
+    /// large; and the expected squared error of irradiance over pi, relative to the reference radiance.
+    #[inline]
+    fn beyond_element<'g, 's>(
+        &'s self,
         point: &GatherPoint<'_>,
         far: f64,
         (mut gathered, images): (Option<&'g mut Gathered>, &mut [[f64; MAX_BANDS]; 2]),
         mode: &mut Mode<'_, '_>,
         path: &mut Path,
-    ) -> Arriving<'g> {
+        // written where it stands: it is large
+        open: &mut Option<OpenAt<'s>>,
+    ) -> (&'g [f64], f64) {
         let GatherPoint { surface, unknown, local, weight, .. } = *point;
         let mut variance = f64::from(self.variance.at(unknown));
         if let Some(gathered) = gathered.as_deref_mut()
@@ -859,13 +864,11 @@ impl Solved<'_> {
             variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
         let by_element = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
-        let looks = self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element);
-        let open = match gathered.as_deref_mut() {
-            Some(kept) if looks => {
-                self.open_in_pixel(surface, unknown, local, &mut kept.skies, mode.occluders)
-            }
-            _ => None,
-        };
+        if let Some(kept) = gathered.as_deref_mut()
+            && (self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element))
+        {
+            *open = self.open_in_pixel(surface, unknown, local, &mut kept.skies, mode.occluders);
+        }
         variance += if open.is_some() { 0.0 } else { by_element };
         let mut correction: &[f64] = &[];
         if self.wants_rays(surface, weight, variance)
@@ -876,19 +879,8 @@ impl Solved<'_> {
                 (correction, variance) = (near, left);
             }
         }
-        variance += open.as_ref().map_or(0.0, |open| open.variance);
-        Arriving { open, correction, variance }
+        (correction, variance + open.as_ref().map_or(0.0, |open| open.variance))
     }
-}
-
-/// What is known of the light at a point beyond its element's linear function.
-struct Arriving<'g> {
-    /// The straight sky.
-    open: Option<OpenAt<'g>>,
-    /// Irradiance that final gathering adds, one value per band; empty where it was not used.
-    correction: &'g [f64],
-    /// Expected squared error of irradiance over pi, relative to the reference radiance.
-    variance: f64,
 }
 
 /// Number of sets of signs of the elements' errors; in the last, all have one sign.
