@@ -613,7 +613,7 @@ impl Tracer<'_, '_> {
         mut mark: [f32; 2],
         clear: Option<&ProvenVisible<'_>>,
     ) -> Option<Option<Arrival>> {
-        let (bin, part) = (mark[0] as usize, tally.rays as usize % ELEMENT_PARTS);
+        let (bin, part) = (mark[0] as usize % ROW_BINS, tally.rays as usize % ELEMENT_PARTS);
         let surface = Surface::of_hit(self.scene, hit);
         tally.backs[bin] += u32::from(surface.is_none());
         if tally.apart[bin] && inside(self.bvh, ray, self.scene.side_normal(start.facet, start.side)) {
