@@ -5,3 +5,4 @@ pub(crate) mod inside;
 pub mod outline;
 pub mod ray;
 pub mod surface;
+pub(crate) mod swept;

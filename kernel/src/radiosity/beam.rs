@@ -18,9 +18,10 @@ use crate::coupling::rows::lobe_point;
 use crate::coupling::{Coupling, Record, Row, TRACED};
 use crate::radiosity::direct::TableShape;
 use crate::radiosity::sun_image::{SunImagesMut, pack};
-use crate::rays::bvh::Bvh;
+use crate::rays::bvh::{Bvh, HalfSpace};
 use crate::rays::ray::Ray;
-use crate::rays::surface::Surface;
+use crate::rays::surface::{Surface, opens_to_sky};
+use crate::rays::swept::swept;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
 use core::ops::Range;
@@ -118,6 +119,11 @@ impl Tracer<'_, '_> {
             self.builder.end_row(Row::default(), Some, Record::join_beam);
             return Some(());
         }
+        let ahead = self.ahead(facet, side);
+        if ahead[1].is_nothing() {
+            self.builder.end_row(Row { state: TRACED, ..Row::default() }, Some, Record::join_beam);
+            return Some(());
+        }
         let wanted = clamp(area * self.settings.density, FACET_BEAM_RAYS_FEWEST, FACET_BEAM_RAYS_MOST);
         let rays = (wanted as u32).next_power_of_two();
         let sequence = Sequence::new(hash2(row as u32, 0xbea3_0000));
@@ -126,13 +132,8 @@ impl Tracer<'_, '_> {
         for first in (0..rays).step_by(BEAM_RAYS_UNMERGED) {
             let end = rays.min(first + BEAM_RAYS_UNMERGED as u32);
             for start in (first..end).step_by(BEAM_RAYS_TOGETHER) {
-                self.rays(
-                    facet,
-                    side,
-                    &sequence,
-                    start..end.min(start + BEAM_RAYS_TOGETHER as u32),
-                    &mut stats,
-                )?;
+                let numbers = start..end.min(start + BEAM_RAYS_TOGETHER as u32);
+                self.rays((facet, side, &ahead), &sequence, numbers, &mut stats)?;
             }
             if self.builder.present() >= fold {
                 fold = RECORDS_UNMERGED.max(2 * self.builder.merge_duplicates(Record::join_beam));
@@ -144,11 +145,30 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
+    /// What may stand in the way of the sun's light toward a mirror's side and, where it is flat and ideal, of the light that
+    /// it throws: the same hits by fewer looks.
+    fn ahead(&self, facet: usize, side: usize) -> [Ahead; 2] {
+        let (scene, bvh) = (self.scene, self.bvh);
+        let (Some(corners), true) = (scene.corners().get(facet), bvh.is_own()) else {
+            return [Ahead::UNKNOWN; 2];
+        };
+        let surface = Surface::new(scene, facet, side, 1.0 / 3.0, 1.0 / 3.0);
+        if opens_to_sky(scene, bvh, facet, surface.normal) {
+            return [Ahead::NOTHING; 2];
+        }
+        let along = |direction: Vec3| match swept(corners, surface.normal, direction, self.sun.half_angle()) {
+            Some(halves) => Ahead::within(bvh, &halves, facet as u32),
+            None => Ahead::UNKNOWN,
+        };
+        let toward = self.sun.direction();
+        let turns = !scene.is_smooth() && surface.flat_mirror(scene).is_some();
+        [along(toward), if turns { along(surface.mirrored(scene, -toward)) } else { Ahead::UNKNOWN }]
+    }
+
     /// The rays of these numbers, at most [`BEAM_RAYS_TOGETHER`], from mirror to mirror together.
     fn rays(
         &mut self,
-        facet: usize,
-        side: usize,
+        (facet, side, [sunward, mirrored]): (usize, usize, &[Ahead; 2]),
         sequence: &Sequence,
         numbers: Range<u32>,
         stats: &mut Row,
@@ -175,11 +195,19 @@ impl Tracer<'_, '_> {
             }
         }
         let mut hidden = [false; BEAM_RAYS_TOGETHER];
-        bvh.occluded_many(rays.head(count), hidden.head_mut(count));
+        match sunward.facets() {
+            Some([]) => {}
+            Some(facets) => {
+                let all = rays.head(count).iter().zip(hidden.head_mut(count));
+                all.for_each(|(ray, hidden)| *hidden = bvh.closest_among(ray, facets).is_some());
+            }
+            None => bvh.occluded_many(rays.head(count), hidden.head_mut(count)),
+        }
         for (chain, _) in chains.iter_mut().zip(hidden).filter(|(_, hidden)| *hidden) {
             *chain = None;
         }
         let mut hits = [None; BEAM_RAYS_TOGETHER];
+        let mut known = mirrored.facets();
         while count > 0 {
             let mut left = 0;
             for at in 0..count {
@@ -190,7 +218,13 @@ impl Tracer<'_, '_> {
                     left += 1;
                 }
             }
-            bvh.closest_many(rays.head(left), hits.head_mut(left));
+            match known.take() {
+                Some(facets) => {
+                    let all = rays.head(left).iter().zip(hits.head_mut(left));
+                    all.for_each(|(ray, hit)| *hit = bvh.closest_among(ray, facets));
+                }
+                None => bvh.closest_many(rays.head(left), hits.head_mut(left)),
+            }
             for (chain, hit) in chains.head_mut(left).iter_mut().zip(hits) {
                 let surface = hit.and_then(|hit| {
                     stats.chain_rays += 1;
@@ -241,6 +275,44 @@ impl Tracer<'_, '_> {
         let image = chain.axis.map_or(0, |axis| pack(-axis));
         let from = (image, if image == 0 { 0 } else { chain.mirror as u32 });
         self.builder.push(Record::beam(target, chain.path, chain.flux / area, from))
+    }
+}
+
+/// The most facets that [`Ahead`] names: more of them cost a ray as much as the tree does.
+const AHEAD_FACETS: usize = 12;
+
+/// Facets that may stand in the way of rays that leave a facet in almost one direction.
+#[derive(Clone, Copy)]
+struct Ahead {
+    facets: [u32; AHEAD_FACETS],
+    /// How many; more than [`AHEAD_FACETS`]: which is not known.
+    count: usize,
+}
+
+impl Ahead {
+    const NOTHING: Ahead = Ahead { facets: [0; AHEAD_FACETS], count: 0 };
+    const UNKNOWN: Ahead = Ahead { count: usize::MAX, ..Ahead::NOTHING };
+
+    /// What reaches into a region, the facet `own` apart.
+    #[inline(never)]
+    fn within(bvh: &Bvh<'_>, halves: &[HalfSpace; 4], own: u32) -> Ahead {
+        let mut ahead = Ahead::NOTHING;
+        bvh.within(halves, |facet| {
+            if facet != own {
+                ahead.facets.set(ahead.count, facet);
+                ahead.count += 1;
+            }
+            ahead.count <= AHEAD_FACETS
+        });
+        ahead
+    }
+
+    fn facets(&self) -> Option<&[u32]> {
+        self.facets.get(..self.count)
+    }
+
+    fn is_nothing(&self) -> bool {
+        self.count == 0
     }
 }
 

@@ -6,9 +6,9 @@ use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
 use crate::radiosity::sun_image::{Image, Nearby, SUN_DISTANCE_LEAST};
-use crate::rays::bvh::HalfSpace;
 use crate::rays::outline::Candidates;
-use crate::rays::surface::{OFFSET, Surface};
+use crate::rays::surface::Surface;
+use crate::rays::swept::{SWEPT_MARGIN, swept};
 use crate::scene::NO_MIRROR;
 
 /// Directions in which rays leave a facet's side.
@@ -212,10 +212,6 @@ impl<'m> OccluderCache<'m> {
     }
 }
 
-/// Distance from the region in which rays run up to which facets count as occluders, in scene coordinates: far above
-/// the rounding of points, directions and hits.
-const OCCLUDER_MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
-
 impl Occluders {
     /// Finds what reaches into the region that the facet sweeps along the directions, from where rays start above it.
     #[inline(never)]
@@ -223,18 +219,7 @@ impl Occluders {
         self.count = OCCLUDERS_TOO_MANY;
         let corners = solved.scene.corners().at(surface.facet);
         let normal = surface.normal;
-        let top = corners.iter().map(|c| c.dot(normal)).fold(f64::NEG_INFINITY, f64::max);
-        // rays start twice as high
-        let plane = HalfSpace { normal, height: top + 0.5 * OFFSET };
-        let mut halves = [plane; 4];
-        let [a, b, c] = corners;
-        for (half, (from, to, other)) in
-            halves.part_mut(1..4).iter_mut().zip([(a, b, c), (b, c, a), (c, a, b)])
-        {
-            let Some(inward) = inward(to - from, other - from, direction, spread) else { return };
-            *half =
-                HalfSpace { normal: inward, height: inward.dot(from).min(inward.dot(to)) - OCCLUDER_MARGIN };
-        }
+        let Some(halves) = swept(&corners, normal, direction, spread) else { return };
         let (mut count, own) = (0, surface.facet as u32);
         // of what is in the way to an image of the sun, the mirrors that may show it count
         let image = self.kind >= RayKind::Image(0).number();
@@ -277,32 +262,10 @@ pub(super) fn may_meet(corners: &[Vec3; 3], point: Vec3, axis: Vec3, spread: f64
     let [a, b, c] = *corners;
     let farthest = [a, b, c].iter().map(|&corner| (corner - point).length_squared()).fold(0.0, f64::max);
     // twice the spread: more than its tangent
-    let off = OCCLUDER_MARGIN + 2.0 * spread * sqrt(farthest);
+    let off = SWEPT_MARGIN + 2.0 * spread * sqrt(farthest);
     [(a, b, c), (b, c, a), (c, a, b)].iter().all(|&(from, to, other)| {
         let across = (to - from).cross(axis);
         let across = if across.dot(other - from) < 0.0 { -across } else { across };
         across.dot(point - from) >= -off * sqrt(across.dot(across))
     })
-}
-
-/// The normal of the plane along an edge and the direction, turned outward so far that all within the spread are on the
-/// side of the other corner; `None` where they are all around.
-fn inward(edge: Vec3, other: Vec3, direction: Vec3, spread: f64) -> Option<Vec3> {
-    let across = edge.cross(direction);
-    let length = sqrt(across.dot(across));
-    let edge_length = sqrt(edge.dot(edge));
-    // the sine of the angle between edge and direction, of which the spread is to be a part
-    let sine = length / edge_length;
-    if !(sine > 4.0 * spread && sine > 1e-6) {
-        return None;
-    }
-    let across = across * (if across.dot(other) < 0.0 { -1.0 } else { 1.0 } / length);
-    if spread == 0.0 {
-        return Some(across);
-    }
-    // the direction's part at right angles to the edge
-    let ahead = direction - edge * (edge.dot(direction) / (edge_length * edge_length));
-    let ahead = ahead / sqrt(ahead.dot(ahead));
-    let turn = spread / sine;
-    Some(across * sqrt(1.0 - turn * turn) + ahead * turn)
 }
