@@ -521,15 +521,22 @@ inline blik_sun sun(const vector3 &direction) {
     return value;
 }
 
-/* A sky, a sun or both; copied, but for the arrays that they point to. */
+/* A sky, a sun, both or none; copied, but for the arrays that they point to. */
 class light {
 public:
+    /* What emission alone lights. */
+    light() = default;
     explicit light(const blik_sky &sky) : sky_(sky), has_sky_(true) {}
     explicit light(const blik_sun &sun) : sun_(sun), has_sun_(true) {}
     light(const blik_sky &sky, const blik_sun &sun) : sky_(sky), sun_(sun), has_sky_(true), has_sun_(true) {}
     /* One value per band, to which tolerance and errors are related. */
     light &reference_radiance(std::vector<double> values) {
         reference_ = std::move(values);
+        return *this;
+    }
+    /* Own diffuse radiance of each facet, side and band, bands innermost, in place of the materials' emission. */
+    light &emission(std::vector<double> values) {
+        emission_ = std::move(values);
         return *this;
     }
     /* The struct of the C interface, which points into this object. */
@@ -539,6 +546,8 @@ public:
         value.sky = has_sky_ ? &sky_ : nullptr;
         value.sun = has_sun_ ? &sun_ : nullptr;
         value.reference_radiance = reference_.empty() ? nullptr : reference_.data();
+        value.emission = emission_.empty() ? nullptr : emission_.data();
+        value.emission_count = emission_.size();
         return value;
     }
     blik_light get() && = delete;
@@ -548,7 +557,7 @@ private:
     blik_sun sun_{};
     bool has_sky_ = false;
     bool has_sun_ = false;
-    std::vector<double> reference_;
+    std::vector<double> reference_, emission_;
 };
 
 /* An orthographic camera; height in the mesh's unit. */
@@ -950,6 +959,92 @@ private:
     detail::owner<blik_solution> owner_;
     std::size_t bands_ = 0;
 };
+
+/* What many lights give: of each light one value per facet, side and band, bands innermost; of each light one entry per view
+ * and band. */
+struct lit {
+    std::vector<double> irradiance, radiance;
+    std::vector<blik_signature> signatures;
+};
+
+/* Solves many lights against one coupling: the numbers of a solution of each, sooner. Directions are any container of what a
+ * vector3 is made of, toward the object. */
+template <typename C>
+lit lights(const coupling &coupling, const std::vector<light> &all, const C &directions, const blik_run &run = alone(),
+           std::size_t cells = 0) {
+    std::vector<blik_light> values;
+    for (const light &one : all) {
+        values.push_back(one.get());
+    }
+    std::vector<double> numbers;
+    for (const auto &direction : directions) {
+        const vector3 from(direction);
+        numbers.insert(numbers.end(), {from[0], from[1], from[2]});
+    }
+    const std::size_t views = numbers.size() / 3;
+    const blik_coupling_info sizes = coupling.info();
+    lit out;
+    out.irradiance.resize(all.size() * sizes.facets * sizes.sides * sizes.bands);
+    out.radiance.resize(out.irradiance.size());
+    out.signatures.resize(all.size() * views * sizes.bands);
+    blik_error info{};
+    detail::guard on(run);
+    const detail::scratch scratch([&](blik_error *e, std::size_t *bytes) {
+        return blik_lights_scratch_size(coupling.get(), values.data(), values.size(), sizeof(blik_light), on.get(), e, bytes);
+    });
+    on.check(blik_lights(coupling.get(), values.data(), values.size(), sizeof(blik_light), numbers.data(), views, cells,
+                         on.get(), scratch.data(), scratch.size(), &info, out.irradiance.data(), out.irradiance.size(),
+                         out.radiance.data(), out.radiance.size(), out.signatures.data(), out.signatures.size(),
+                         sizeof(blik_signature)),
+             info);
+    return out;
+}
+inline lit lights(const coupling &coupling, const std::vector<light> &all, std::initializer_list<vector3> directions = {},
+                  const blik_run &run = alone(), std::size_t cells = 0) {
+    return lights<std::initializer_list<vector3>>(coupling, all, directions, run, cells);
+}
+
+/* What signatures are made of and depend on: of each view one entry per band; one value per facet and band; three terms per
+ * band; one value per facet and band; one per facet, side and band. */
+struct explanation {
+    std::vector<blik_signature> signatures;
+    std::vector<double> shares, terms, by_diffuse, by_emission;
+};
+
+/* Solves for a light and explains the signature in each direction, any container of what a vector3 is made of. */
+template <typename C>
+explanation explain(const coupling &coupling, const light &light, const C &directions, std::size_t cells = 0,
+                    const blik_run &run = alone()) {
+    const blik_light value = light.get();
+    std::vector<double> numbers;
+    for (const auto &direction : directions) {
+        const vector3 from(direction);
+        numbers.insert(numbers.end(), {from[0], from[1], from[2]});
+    }
+    const std::size_t views = numbers.size() / 3;
+    const blik_coupling_info sizes = coupling.info();
+    const std::size_t values = views * sizes.facets * sizes.bands;
+    explanation out;
+    out.signatures.resize(views * sizes.bands);
+    out.shares.resize(values);
+    out.terms.resize(views * 3 * sizes.bands);
+    out.by_diffuse.resize(values);
+    out.by_emission.resize(values * sizes.sides);
+    blik_error info{};
+    detail::guard on(run);
+    const detail::scratch scratch(
+        [&](blik_error *e, std::size_t *bytes) { return blik_explain_scratch_size(coupling.get(), &value, e, bytes); });
+    on.check(blik_explain(coupling.get(), &value, numbers.data(), views, cells, on.get(), scratch.data(), scratch.size(),
+                          &info, out.signatures.data(), out.signatures.size(), sizeof(blik_signature), out.shares.data(),
+                          out.shares.size(), out.terms.data(), out.terms.size(), out.by_diffuse.data(),
+                          out.by_diffuse.size(), out.by_emission.data(), out.by_emission.size()),
+             info);
+    return out;
+}
+inline explanation explain(const coupling &coupling, const light &light, std::initializer_list<vector3> directions,
+                           std::size_t cells = 0, const blik_run &run = alone()) {
+    return explain<std::initializer_list<vector3>>(coupling, light, directions, cells, run);
+}
 
 /* A tally of nothing, to which add() adds. */
 inline blik_tally tally() {

@@ -84,7 +84,7 @@ const FACETS: [[u32; 3]; 5] = [[0, 1, 2], [0, 2, 3], [0, 3, 5], [0, 5, 4], [1, 1
 const MATERIALS: [u32; 5] = [0, 0, 1, 1, 0];
 
 /// The inputs of a run, to be changed at will.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 struct Inputs {
     vertices: Vec<[f64; 3]>,
     facets: Vec<[u32; 3]>,
@@ -101,6 +101,8 @@ struct Inputs {
     half_angle: f64,
     camera: [f64; 10],
     choices: [i32; 3],
+    /// The light's emission, of five facets, two sides and two bands at most; all 0: the materials'.
+    emission: [f64; 20],
 }
 
 impl Inputs {
@@ -121,6 +123,7 @@ impl Inputs {
             half_angle: 0.2665,
             camera: [3.0, 0.5, 2.0, 0.5, 0.5, 0.3, 0.0, 0.0, 1.0, 2.0],
             choices: [0, 0, 0],
+            emission: [0.0; 20],
         }
     }
 
@@ -129,7 +132,7 @@ impl Inputs {
         for _ in 0..1 + random.below(3) {
             let x = random.number();
             let odd = [0, 1, 5, 6, 7, 1000, u32::MAX, 1 << 31][random.below(8)];
-            match random.below(13) {
+            match random.below(14) {
                 0 => self.vertices[random.below(6)][random.below(3)] = x,
                 1 => self.facets[random.below(5)][random.below(3)] = odd,
                 2 => self.facet_materials[random.below(5)] = odd,
@@ -142,6 +145,7 @@ impl Inputs {
                 9 => self.up[random.below(3)] = x,
                 10 => self.sun[random.below(3)] = x,
                 11 => self.half_angle = x,
+                12 => self.emission[random.below(20)] = x.abs(),
                 _ => match random.below(3) {
                     0 => self.choices[random.below(3)] = random.below(4) as i32 - 1,
                     1 => self.tolerance = if x > 0.02 { x } else { -x },
@@ -186,7 +190,12 @@ fn with_light<R>(inputs: &Inputs, with: impl FnOnce(&blik_light) -> R) -> R {
     (sky.table, sky.table_rows, sky.table_columns) = (samples.as_ptr(), 2, 4);
     let mut sun = blik_sun::default();
     (sun.direction, sun.half_angle_deg) = (inputs.sun, inputs.half_angle);
-    with(&blik_light { sky: &sky, sun: &sun, ..blik_light::default() })
+    let mut light = blik_light { sky: &sky, sun: &sun, ..blik_light::default() };
+    if inputs.emission.iter().any(|x| *x != 0.0) {
+        light.emission = inputs.emission.as_ptr();
+        light.emission_count = 4 * inputs.facets.len() / if inputs.choices[2] == 0 { 2 } else { 1 };
+    }
+    with(&light)
 }
 
 /// The mesh of `inputs`, handed to `with`.
@@ -254,6 +263,107 @@ fn image(solution: *const blik_solution, inputs: &Inputs) -> Option<Vec<u32>> {
     }
     assert!(pixels.iter().all(|p| p.is_finite()));
     Some(pixels.iter().map(|p| p.to_bits()).collect())
+}
+
+/// The light three times in one call: the same finite numbers each time, or refused.
+fn lights(coupling: *const blik_coupling, inputs: &Inputs, run: *const blik_run) -> Result<Vec<u64>, i32> {
+    let values = 4 * inputs.facets.len() / if inputs.choices[2] == 0 { 2 } else { 1 };
+    let (mut e, mut l) = (vec![0.0; 3 * values], vec![0.0; 3 * values]);
+    // SAFETY: all are numbers.
+    let mut signatures: [blik_signature; 6] = unsafe { std::mem::zeroed() };
+    let direction = [-0.3, 0.1, -1.0];
+    let status = with_light(inputs, |light| {
+        let all = [*light; 3];
+        let (sizes, none) = ((size_of::<blik_light>(), size_of::<blik_signature>()), null_mut());
+        let (to_e, to_l, to) = (e.as_mut_ptr(), l.as_mut_ptr(), signatures.as_mut_ptr());
+        // SAFETY: arrays as long as stated.
+        unsafe {
+            blik_lights(
+                coupling,
+                all.as_ptr(),
+                3,
+                sizes.0,
+                direction.as_ptr(),
+                1,
+                8,
+                run,
+                none,
+                0,
+                null_mut(),
+                to_e,
+                e.len(),
+                to_l,
+                l.len(),
+                to,
+                6,
+                sizes.1,
+            )
+        }
+    });
+    if status == BLIK_ERROR_MEMORY || status == BLIK_ERROR_CANCELLED || refused(status) {
+        return Err(status);
+    }
+    let intensities = signatures.map(|s| s.radiant_intensity);
+    let all = e.iter().chain(&l).chain(&intensities);
+    assert!(all.clone().all(|x| x.is_finite() && *x >= 0.0), "{inputs:?}");
+    assert!(e[..values] == e[values..2 * values] && e[..values] == e[2 * values..], "the same light");
+    assert!(intensities[..2] == intensities[4..], "the same light");
+    Ok(all.map(|x| x.to_bits()).collect())
+}
+
+/// What two signatures are made of: finite, and all of it adds up; or refused.
+fn explain(coupling: *const blik_coupling, inputs: &Inputs, run: *const blik_run) -> Result<Vec<u64>, i32> {
+    let (facets, sides) = (inputs.facets.len(), if inputs.choices[2] == 0 { 1 } else { 2 });
+    let (mut shares, mut terms) = (vec![0.0; 4 * facets], vec![0.0; 12]);
+    let (mut diffuse, mut emission) = (vec![0.0; 4 * facets], vec![0.0; 4 * facets * sides]);
+    // SAFETY: all are numbers.
+    let mut signatures: [blik_signature; 4] = unsafe { std::mem::zeroed() };
+    let directions = [-0.3, 0.1, -1.0, 1.0, 0.0, 0.0];
+    let status = with_light(inputs, |light| {
+        let (none, to) = (null_mut(), signatures.as_mut_ptr());
+        let at = [&mut shares, &mut terms, &mut diffuse, &mut emission].map(|x| (x.as_mut_ptr(), x.len()));
+        let from = directions.as_ptr();
+        let stride = size_of::<blik_signature>();
+        // SAFETY: arrays as long as stated.
+        unsafe {
+            blik_explain(
+                coupling,
+                light,
+                from,
+                2,
+                8,
+                run,
+                none,
+                0,
+                null_mut(),
+                to,
+                4,
+                stride,
+                at[0].0,
+                at[0].1,
+                at[1].0,
+                at[1].1,
+                at[2].0,
+                at[2].1,
+                at[3].0,
+                at[3].1,
+            )
+        }
+    });
+    if status == BLIK_ERROR_MEMORY || status == BLIK_ERROR_CANCELLED || refused(status) {
+        return Err(status);
+    }
+    let all = [&shares[..], &terms, &diffuse, &emission].concat();
+    assert!(all.iter().all(|x| x.is_finite()), "{inputs:?}");
+    for (number, signature) in signatures.iter().enumerate() {
+        let (view, band) = (number / 2, number % 2);
+        let own: f64 = (0..facets).map(|facet| shares[2 * (view * facets + facet) + band]).sum();
+        let sum: f64 = (0..3).map(|term| terms[6 * view + 2 * term + band]).sum();
+        let whole = signature.radiant_intensity;
+        // the same numbers in another order
+        assert!((own - whole).abs() <= 1e-12 * whole && (sum - whole).abs() <= 1e-12 * whole, "{inputs:?}");
+    }
+    Ok(all.iter().map(|x| x.to_bits()).collect())
 }
 
 /// A block of a solved scene.
@@ -423,6 +533,10 @@ fn odd_numbers_are_refused_or_shown_finite() {
         inputs.spoil(&mut random);
         let Some(made) = prepare(&inputs) else { continue };
         shown += u32::from(image(made.solution, &inputs).is_some());
+        assert!(lights(made.coupling, &inputs, null()).is_ok(), "as the solution");
+        // reflections are counted for small numbers of them
+        let counted = (0..=32).contains(&inputs.max_bounces);
+        assert_eq!(explain(made.coupling, &inputs, null()).is_err(), counted, "{inputs:?}");
     }
     println!("{shown} of {tries} inputs shown");
     assert!(shown > 20, "{shown} of {tries}");

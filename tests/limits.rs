@@ -92,8 +92,7 @@ fn without_mirrors_it_is_equation_3() {
                         "no path by way of a mirror"
                     );
                 }
-                let light =
-                    Light { sky: Some(Sky::new(&case.sky.as_ref().unwrap().input(), 1).unwrap()), sun: None };
+                let light = Light::new(Some(&case.sky.as_ref().unwrap().input()), None, 1).unwrap();
                 let mut table = vec![0.0; 3 * unknowns];
                 let sky = light.sky.as_ref().unwrap();
                 let straight = solved.straight;

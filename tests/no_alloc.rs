@@ -23,9 +23,8 @@ use blik_kernel::radiosity::straight::Straight;
 use blik_kernel::scene::Scene;
 use blik_kernel::signature::{self, Sums, View};
 use blik_kernel::simd::Isa;
-use blik_kernel::sky::{Sky, SkyModel};
+use blik_kernel::sky::SkyModel;
 use blik_kernel::subdivide::SubdivisionTree;
-use blik_kernel::sun::Sun;
 use case::{Case, SkyOf, SunOf, orthographic, within};
 use stages::{Plan, Workspace};
 use std::alloc::{GlobalAlloc, Layout, System as Heap};
@@ -181,7 +180,7 @@ fn with_stages(check: impl FnOnce(&System<'_>, &Bvh<'_>, &RowSettings)) {
         let (scene, elements, coupling) =
             (geometry.scene(), geometry.elements(), geometry.coupling().unwrap());
         let (sky, sun) = (case.sky.as_ref().unwrap().input(), case.sun.as_ref().unwrap().input());
-        let light = Light { sky: Some(Sky::new(&sky, 3).unwrap()), sun: Some(Sun::new(&sun, 3).unwrap()) };
+        let light = Light::new(Some(&sky), Some(&sun), 3).unwrap();
         let shape = TableShape { levels: 1, bands: 3 };
         let direct = vec![0.5; elements.unknowns() * shape.stride()];
         let lit = vec![0.5; elements.unknowns()];

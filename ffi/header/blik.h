@@ -239,6 +239,8 @@ static inline void blik_light_init(blik_light *light)
     light->sky = NULL;
     light->sun = NULL;
     light->reference_radiance = NULL;
+    light->emission = NULL;
+    light->emission_count = 0;
 }
 
 @blik_solution
@@ -335,6 +337,10 @@ static inline void blik_rounds_init(blik_rounds *rounds, double asked)
 @blik_signature
 @blik_signatures
 @blik_facets
+@blik_lights_scratch_size
+@blik_lights
+@blik_explain_scratch_size
+@blik_explain
 /* ---- Baked blocks: a prepared scene as bytes --------------------------------------------------------------------- */
 
 @BLIK_BLOCK_ALIGNMENT

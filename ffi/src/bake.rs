@@ -9,6 +9,7 @@ use crate::status::*;
 use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::bake::{self, Baked};
 use blik_kernel::coupling::Block;
+use blik_kernel::light::LightInput;
 use blik_kernel::simd::Isa;
 use core::ffi::c_void;
 use core::ptr::null_mut;
@@ -25,7 +26,12 @@ fn baked(
     if solution.is_some_and(|s| !core::ptr::eq(s.coupling, coupling)) {
         return Err(blik_error::of(BLIK_ERROR_HANDLE));
     }
-    let solution = solution.map(|s| bake::Solution { sky: s.input.0, sun: s.input.1, record: s.record });
+    let solution = solution.map(|s| bake::Solution {
+        sky: s.input.sky,
+        sun: s.input.sun,
+        emission: s.input.emission,
+        record: s.record,
+    });
     Ok(Baked {
         scene: coupling.base.scene,
         bvh: coupling.base.bvh,
@@ -199,7 +205,7 @@ pub unsafe extern "C" fn blik_load(
         let table = block_table(rest, parts);
         let baked = Baked::load(block, Isa::detect(), table)?;
         let lit = match &baked.solution {
-            Some(solution) => Some((*solution, solution.light(baked.scene.bands())?)),
+            Some(solution) => Some((*solution, solution.light(&baked.scene)?)),
             None => None,
         };
         let settings = Settings { asked: baked.settings, fit: false };
@@ -211,7 +217,8 @@ pub unsafe extern "C" fn blik_load(
             let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
             let mut solved = null_mut();
             if let Some((own, light)) = lit {
-                let (record, input) = (own.record, (own.sky, own.sun));
+                let (record, emission) = (own.record, own.emission);
+                let input = LightInput { sky: own.sky, sun: own.sun, emission, reference: None };
                 solution_at.write(blik_solution::new(coupled, light, input, record, record.memory()));
                 solved = solution_at.as_ptr();
             }

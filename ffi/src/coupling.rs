@@ -127,6 +127,12 @@ pub struct blik_coupling_info {
     /// Bytes in use. Of a coupling that blik_coupling_init made: from the start of its memory, the rest of which is
     /// free again.
     pub bytes: usize,
+    /// Facets of its scene, degenerate ones included.
+    pub facets: usize,
+    /// Sides of a facet that carry its material: 1 or 2.
+    pub sides: usize,
+    /// Spectral bands.
+    pub bands: usize,
 }
 
 impl Default for blik_coupling_info {
@@ -141,10 +147,13 @@ impl Default for blik_coupling_info {
             rays: 0,
             dropped: 0.0,
             bytes: 0,
+            facets: 0,
+            sides: 0,
+            bands: 0,
         }
     }
 }
-sized!(blik_coupling_info);
+sized!(blik_coupling_info from facets);
 
 /// Cuts a block of `size` bytes, of alignment 64, off the front of what is left.
 struct Cutter {
@@ -442,6 +451,9 @@ impl blik_coupling {
             rays: self.rays,
             dropped: 0.0,
             bytes: self.extent.max(matrix.memory() + self.elements.memory()),
+            facets: self.base.scene.facets(),
+            sides: self.base.scene.sides(),
+            bands: self.base.scene.bands(),
         };
         for (_, row) in matrix.rows(0..matrix.unknowns()) {
             info.pairs += row.targets.len() as u64;

@@ -8,8 +8,10 @@
 
 mod bake;
 mod coupling;
+mod explain;
 mod form_factor;
 mod intersector;
+mod lights;
 mod memory;
 mod mesh;
 mod plane;
@@ -24,8 +26,10 @@ mod view;
 
 pub use bake::*;
 pub use coupling::*;
+pub use explain::*;
 pub use form_factor::*;
 pub use intersector::{blik_any_facets, blik_first_facets, blik_intersector, blik_scene_set_intersector};
+pub use lights::*;
 pub use plane::*;
 pub use report::*;
 #[cfg(feature = "std")]

@@ -161,7 +161,8 @@ impl Runner {
         }
     }
 
-    fn told(&self, done: f64) -> bool {
+    /// Tells the caller's progress function; false where it asks to stop.
+    pub fn told(&self, done: f64) -> bool {
         let Some(progress) = self.run.progress else { return true };
         // SAFETY: the caller's function, with the caller's pointer.
         (unsafe { progress(self.run.progress_user, done) }) == 0

@@ -6,12 +6,11 @@ use crate::run::{Runner, blik_run};
 use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
-use blik_kernel::Error;
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::chain::Solved;
-use blik_kernel::light::{self, Light};
+use blik_kernel::light::{Light, LightInput};
 use blik_kernel::radiosity::solution::Solution;
-use blik_kernel::scene::MAX_BANDS;
+use blik_kernel::scene::{MAX_BANDS, Scene};
 use blik_kernel::sky::SkyInput;
 use blik_kernel::sky::record::SkyRecord;
 use blik_kernel::stages::{Beams, Lighting, Sizes};
@@ -24,7 +23,7 @@ pub struct blik_solution {
     pub(crate) coupling: &'static blik_coupling,
     pub(crate) light: Light<'static>,
     /// What the light was made from.
-    pub(crate) input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
+    pub(crate) input: LightInput<'static>,
     pub(crate) record: Solution<'static>,
     /// Bytes that stay in use.
     pub(crate) bytes: usize,
@@ -50,7 +49,7 @@ impl blik_solution {
     pub(crate) fn new(
         coupling: &'static blik_coupling,
         light: Light<'static>,
-        input: (Option<SkyInput<'static>>, Option<SunInput<'static>>),
+        input: LightInput<'static>,
         record: Solution<'static>,
         bytes: usize,
     ) -> blik_solution {
@@ -82,13 +81,6 @@ impl blik_solution {
 static ONES: [f64; MAX_BANDS] = [1.0; MAX_BANDS];
 static ZEROS: [f64; MAX_BANDS] = [0.0; MAX_BANDS];
 static PIS: [f64; MAX_BANDS] = [core::f64::consts::PI; MAX_BANDS];
-
-/// The caller's light, its arrays still the caller's.
-struct Given<'a> {
-    sky: Option<SkyInput<'a>>,
-    sun: Option<SunInput<'a>>,
-    reference: Option<&'a [f64]>,
-}
 
 /// One value per band, or the first of `defaults`.
 ///
@@ -129,43 +121,50 @@ unsafe fn given_sky<'a>(sky: *const blik_sky, bands: usize) -> Result<Option<Sky
     record.input(radiance, ground, samples).ok_or(choice).map(Some)
 }
 
-impl Given<'_> {
-    /// # Safety
-    /// As for [`given_sky`].
-    unsafe fn new<'a>(light: *const blik_light, bands: usize) -> Result<Given<'a>, blik_error> {
+/// The caller's light, checked; its arrays are still the caller's.
+///
+/// # Safety
+/// As for [`given_sky`].
+pub(crate) unsafe fn given_light<'a>(
+    light: *const blik_light,
+    scene: &Scene<'_>,
+) -> Result<LightInput<'a>, blik_error> {
+    let bands = scene.bands();
+    // SAFETY: by the caller's promise.
+    let (light, sky) = unsafe {
+        let light = read(light)?;
+        (light, given_sky(light.sky, bands)?)
+    };
+    let sun = if light.sun.is_null() {
+        None
+    } else {
         // SAFETY: by the caller's promise.
-        let (light, sky) = unsafe {
-            let light = read(light)?;
-            (light, given_sky(light.sky, bands)?)
+        let (sun, irradiance) = unsafe {
+            let sun = read(light.sun)?;
+            (sun, values(sun.irradiance, bands, &PIS)?)
         };
-        let sun = if light.sun.is_null() {
-            None
-        } else {
-            // SAFETY: by the caller's promise.
-            let (sun, irradiance) = unsafe {
-                let sun = read(light.sun)?;
-                (sun, values(sun.irradiance, bands, &PIS)?)
-            };
-            Some(SunInput { direction: sun.direction, irradiance, half_angle_deg: sun.half_angle_deg })
-        };
-        let reference = if light.reference_radiance.is_null() {
-            None
-        } else {
-            // SAFETY: by the caller's promise.
-            Some(unsafe { input(light.reference_radiance, bands) }?)
-        };
-        if let Some(reference) = reference {
-            light::check_reference(reference, bands)?;
-        }
-        let given = Given { sky, sun, reference };
-        given.light(bands)?;
-        Ok(given)
+        Some(SunInput { direction: sun.direction, irradiance, half_angle_deg: sun.half_angle_deg })
+    };
+    let reference = if light.reference_radiance.is_null() {
+        None
+    } else {
+        // SAFETY: by the caller's promise.
+        Some(unsafe { input(light.reference_radiance, bands) }?)
+    };
+    if light.emission.is_null() && light.emission_count > 0 {
+        return Err(blik_error::of(BLIK_ERROR_NULL).field(BLIK_FIELD_EMISSION));
     }
-
-    /// The kernel's light, checked.
-    fn light(&self, bands: usize) -> Result<Light<'_>, Error> {
-        Light::new(self.sky.as_ref(), self.sun.as_ref(), bands)
+    let all = scene.facets() * scene.sides() * bands;
+    if !light.emission.is_null() && light.emission_count != all {
+        return Err(blik_error::of(BLIK_ERROR_LENGTH)
+            .field(BLIK_FIELD_EMISSION)
+            .sizes(all, light.emission_count));
     }
+    // SAFETY: by the caller's promise.
+    let emission = unsafe { input(light.emission, light.emission_count) }?;
+    let given = LightInput { sky, sun, emission, reference };
+    given.light(scene)?;
+    Ok(given)
 }
 
 /// Counts of a solution's values and bytes.
@@ -173,23 +172,26 @@ struct Plan {
     sizes: Sizes,
     /// Samples of the sky's table.
     samples: usize,
+    /// Values of the light's own emission.
+    emission: usize,
 }
 
 impl Plan {
-    fn new(coupling: &blik_coupling, given: &Given<'_>) -> Result<Plan, blik_error> {
+    fn new(coupling: &blik_coupling, given: &LightInput<'_>) -> Result<Plan, blik_error> {
         let scene = &coupling.base.scene;
         let samples = given.sky.map_or(0, |sky| sky.model.samples().len());
-        let light = given.light(scene.bands())?;
+        let light = given.light(scene)?;
         let sizes =
             Sizes::new((scene, &coupling.base.bvh), &coupling.elements, &light, &coupling.settings.asked)?;
-        Ok(Plan { sizes, samples })
+        Ok(Plan { sizes, samples, emission: given.emission.len() })
     }
 
     /// Bytes that stay in use.
     fn kept(&self) -> Need {
         let bands = self.sizes.shape().bands;
         let light = Need::new().and::<f64>(bands).and::<f64>(bands).and::<f64>(bands);
-        light.and::<f32>(self.samples).join(self.sizes.solution.need())
+        let light = light.and::<f32>(self.samples).and::<f64>(self.emission);
+        light.join(self.sizes.solution.need())
     }
 
     /// All bytes, with beams on the given number of lanes.
@@ -200,11 +202,12 @@ impl Plan {
     }
 }
 
-/// A light whose arrays stand in a solution's memory.
-type Kept = (Option<SkyInput<'static>>, Option<SunInput<'static>>);
-
-/// Copies the caller's arrays, so that the light lives as long as its memory.
-fn keep(given: &Given<'_>, plan: &Plan, arena: &mut Arena<'static>) -> Result<Kept, blik_error> {
+/// Copies the caller's arrays but for the reference radiance, so that the light lives as long as its memory.
+fn keep(
+    given: &LightInput<'_>,
+    plan: &Plan,
+    arena: &mut Arena<'static>,
+) -> Result<LightInput<'static>, blik_error> {
     let bands = plan.sizes.shape().bands;
     let mut copy = |from: &[f64]| -> Result<&'static [f64], blik_error> {
         let to = arena.take::<f64>(bands)?;
@@ -217,6 +220,8 @@ fn keep(given: &Given<'_>, plan: &Plan, arena: &mut Arena<'static>) -> Result<Ke
     };
     let irradiance = copy(given.sun.map_or(&[], |s| s.irradiance))?;
     let samples = arena.take::<f32>(plan.samples)?;
+    let emission = arena.take::<f64>(plan.emission)?;
+    emission.iter_mut().zip(given.emission).for_each(|(to, from)| *to = *from);
     let sky = given.sky.and_then(|sky| {
         samples.iter_mut().zip(sky.model.samples()).for_each(|(to, from)| *to = *from);
         SkyRecord::new(&sky).input(radiance, ground, samples)
@@ -226,12 +231,12 @@ fn keep(given: &Given<'_>, plan: &Plan, arena: &mut Arena<'static>) -> Result<Ke
         irradiance,
         half_angle_deg: sun.half_angle_deg,
     });
-    Ok((sky, sun))
+    Ok(LightInput { sky, sun, emission, reference: None })
 }
 
 fn build(
     coupling: &'static blik_coupling,
-    given: &Given<'_>,
+    given: &LightInput<'_>,
     memory: &'static mut [u8],
     runner: &mut Runner,
 ) -> Result<*mut blik_solution, blik_error> {
@@ -242,12 +247,12 @@ fn build(
     }
     let (place, rest) = place::<blik_solution>(memory)?;
     let mut arena = Arena::new(rest, 0)?;
-    let (sky, sun) = keep(given, &plan, &mut arena)?;
+    let kept = keep(given, &plan, &mut arena)?;
     let (scene, elements) = (&coupling.base.scene, &coupling.elements);
-    let light = Light::new(sky.as_ref(), sun.as_ref(), scene.bands())?;
+    let light = kept.light(scene)?;
     let mut solution = plan.sizes.solution.take(&mut arena)?;
     let mut scratch = plan.sizes.take_scratch(&mut arena)?;
-    let beam_memory = arena.take::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
+    let beam_memory = arena.keep::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
     let matrix = coupling.matrix()?;
     let settings = &coupling.settings.asked;
     let bvh = &coupling.base.bvh;
@@ -259,7 +264,7 @@ fn build(
     let record = lighting.solve(solution, &mut scratch, rays, runner)?;
     let bytes = plan.kept().bytes()?;
     // SAFETY: `place` made room for it.
-    unsafe { place.write(blik_solution::new(coupling, light, (sky, sun), record, bytes)) };
+    unsafe { place.write(blik_solution::new(coupling, light, kept, record, bytes)) };
     Ok(place.as_ptr())
 }
 
@@ -284,7 +289,7 @@ pub unsafe extern "C" fn blik_solution_size(
         // SAFETY: by the caller's promise.
         let (coupling, given) = unsafe {
             let coupling: &blik_coupling = object(coupling)?;
-            (coupling, Given::new(light, coupling.base.scene.bands())?)
+            (coupling, given_light(light, &coupling.base.scene)?)
         };
         let size = Plan::new(coupling, &given)?.bytes(1)?;
         // SAFETY: not null.
@@ -319,7 +324,7 @@ pub unsafe extern "C" fn blik_solution_init(
         // SAFETY: by the caller's promise.
         let (coupling, given, mut runner, memory) = unsafe {
             let coupling: &blik_coupling = object(coupling)?;
-            let given = Given::new(light, coupling.base.scene.bands())?;
+            let given = given_light(light, &coupling.base.scene)?;
             (coupling, given, Runner::new(run)?, bytes(memory, size)?)
         };
         let made = build(coupling, &given, memory, &mut runner)?;
@@ -355,7 +360,7 @@ pub unsafe extern "C" fn blik_solution_create(
         // SAFETY: by the caller's promise.
         let (coupling, given, mut runner) = unsafe {
             let coupling: &blik_coupling = object(coupling)?;
-            let given = Given::new(light, coupling.base.scene.bands())?;
+            let given = given_light(light, &coupling.base.scene)?;
             (coupling, given, Runner::new(run)?)
         };
         let mut size = Plan::new(coupling, &given)?.bytes(runner.lanes())?;

@@ -65,7 +65,7 @@ pub const BLIK_ERROR_MATERIAL: i32 = 17;
 /// Diffuse and mirror reflectance of material `index` add up to more than 1 in `band`.
 pub const BLIK_ERROR_REFLECTANCE_SUM: i32 = 18;
 
-/// `field` is out of range (`value`, in `band`).
+/// `field` is out of range (`value`, in `band`; of facet `index` where it is one of each facet).
 pub const BLIK_ERROR_RANGE: i32 = 19;
 
 /// The direction `field` is zero or not finite.
@@ -98,6 +98,9 @@ pub const BLIK_ERROR_INTERNAL: i32 = 28;
 /// Body `index` of a plane scene is no circle or polyline; `field` tells why.
 pub const BLIK_ERROR_BODY: i32 = 29;
 
+/// Facet `index` emits or reflects (`field`) light for which the coupling has no entries: it was made for another material.
+pub const BLIK_ERROR_UNCOUPLED: i32 = 30;
+
 pub(crate) fn status_text(number: i32) -> &'static CStr {
     match number {
         BLIK_OK => c"done",
@@ -129,6 +132,7 @@ pub(crate) fn status_text(number: i32) -> &'static CStr {
         BLIK_ERROR_ALIGNMENT => c"memory is not aligned",
         BLIK_ERROR_MEMORY => c"out of memory",
         BLIK_ERROR_INTERNAL => c"internal error",
+        BLIK_ERROR_UNCOUPLED => c"the coupling has no entries for a facet's light",
         BLIK_ERROR_BODY => c"a body of the plane model is not valid",
         _ => c"unknown status",
     }
@@ -299,6 +303,9 @@ pub const BLIK_FIELD_SAMPLES: i32 = 52;
 /// Form factors.
 pub const BLIK_FIELD_FACTORS: i32 = 53;
 
+/// Shares of facets in signatures.
+pub const BLIK_FIELD_SHARES: i32 = 54;
+
 pub(crate) fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
@@ -355,6 +362,7 @@ pub(crate) fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_CELLS => c"cells",
         BLIK_FIELD_SAMPLES => c"samples",
         BLIK_FIELD_FACTORS => c"factors",
+        BLIK_FIELD_SHARES => c"shares",
         _ => c"",
     }
 }
@@ -438,6 +446,12 @@ impl From<Error> for blik_error {
             }
             Error::ReflectanceSum { material, band, sum } => {
                 e::of(BLIK_ERROR_REFLECTANCE_SUM).at(material, band, sum)
+            }
+            Error::FacetRange { facet, band, field, value } => {
+                e::of(BLIK_ERROR_RANGE).field(number(field)).at(facet, band, value)
+            }
+            Error::Uncoupled { facet, field } => {
+                e::of(BLIK_ERROR_UNCOUPLED).field(number(field)).at(facet, 0, 0.0)
             }
             Error::LightBandCount { field, expected, given } => {
                 e::of(BLIK_ERROR_LENGTH).field(number(field)).sizes(expected, given)

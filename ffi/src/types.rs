@@ -190,6 +190,12 @@ pub struct blik_light {
     pub sun: *const blik_sun,
     /// The radiance per band to which errors are related; null (default): from the light.
     pub reference_radiance: *const f64,
+    /// Own diffuse radiance of each facet, side and band, bands innermost, 0 to 1e37 W m-2 sr-1, in place of the materials'
+    /// emission: new temperatures ask for no ray. Facets whose materials neither reflect diffusely nor emit may emit nothing
+    /// here, either (`BLIK_ERROR_UNCOUPLED`). Null (default): the materials'.
+    pub emission: *const f64,
+    /// Number of those values: facets x sides x bands; 0 (default) without them.
+    pub emission_count: usize,
 }
 
 /// Projection of a [`blik_camera`].
@@ -255,7 +261,7 @@ macro_rules! sized {
         }
     )* };
 }
-sized!(blik_mesh, blik_settings from image_tolerance, blik_sky, blik_sun, blik_light, blik_camera);
+sized!(blik_mesh, blik_settings from image_tolerance, blik_sky, blik_sun, blik_light from emission, blik_camera);
 pub(crate) use sized;
 
 /// The size that a struct of the caller tells: not null, aligned, and of this library's or an older header.
@@ -398,6 +404,8 @@ impl Default for blik_light {
             sky: null(),
             sun: null(),
             reference_radiance: null(),
+            emission: null(),
+            emission_count: 0,
         }
     }
 }

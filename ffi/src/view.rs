@@ -1,6 +1,7 @@
 //! Views of a solved scene: images, rays, signatures, facets.
 
 use crate::call;
+use crate::coupling::blik_coupling;
 use crate::memory::*;
 use crate::run::{Runner, Start, blik_run};
 use crate::scene::{blik_ray, check, inside};
@@ -10,11 +11,11 @@ use crate::types::*;
 use blik_kernel::Error;
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
 use blik_kernel::camera::{Camera, CameraInput, Projection, Sampling};
-use blik_kernel::chain::{ChainScratch, RaySample, Terms};
+use blik_kernel::chain::{ChainScratch, RaySample, Solved, Terms};
 use blik_kernel::image::{self, Tally, Target, piece};
 use blik_kernel::math::Vec3;
 use blik_kernel::scene::{MAX_BANDS, Scene};
-use blik_kernel::signature::{self, Signature, View};
+use blik_kernel::signature::{self, Signature, Sums, View};
 use blik_kernel::{facets, policy};
 use core::ffi::c_void;
 use core::ops::Range;
@@ -162,7 +163,7 @@ pub unsafe extern "C" fn blik_image_scratch_size(
 ///
 /// # Safety
 /// `scratch` is null or memory of `size` bytes.
-unsafe fn with_scratch<R>(
+pub(crate) unsafe fn with_scratch<R>(
     scratch: *mut c_void,
     size: usize,
     wanted: usize,
@@ -379,7 +380,7 @@ pub(crate) fn rows_of(first: usize, rows: usize, all: usize) -> Result<Range<usi
 }
 
 /// Bytes of one lane's scratch memory while rays are followed, or a signature is found, and the sky behind it.
-fn lane_bytes() -> Result<usize, blik_error> {
+pub(crate) fn lane_bytes() -> Result<usize, blik_error> {
     let rays = Need::new().and::<Terms>(1).and::<ChainScratch>(1).bytes()?;
     let signature = signature::scratch_bytes()? + Need::new().and::<f64>(MAX_BANDS).bytes()?;
     Ok(rays.max(signature).next_multiple_of(ALIGNMENT))
@@ -517,6 +518,16 @@ pub struct blik_signature {
 /// Cells along a side of a view.
 const MOST_CELLS: usize = 65536;
 
+/// Cells along a side of a view, by a coupling's tolerance where none are asked for.
+pub(crate) fn wanted_cells(cells: usize, coupling: &blik_coupling) -> Result<usize, blik_error> {
+    if cells > MOST_CELLS {
+        let too_many = blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_CELLS);
+        return Err(too_many.sizes(MOST_CELLS, cells));
+    }
+    let tolerance = coupling.settings.asked.budget.solution;
+    Ok(if cells == 0 { policy::signature_cells(tolerance) } else { cells })
+}
+
 /// What distant observers measure of the whole object, without an image.
 ///
 /// - `solution`: the solution
@@ -556,20 +567,13 @@ pub unsafe extern "C" fn blik_signatures(
             let out = Signatures::new(signatures, signature_count, all, signature_stride)?;
             (input(directions, numbers)?, out)
         };
-        let cells = if cells == 0 {
-            policy::signature_cells(solution.coupling.settings.asked.budget.solution)
-        } else {
-            cells
-        };
-        if cells > MOST_CELLS {
-            return Err(too_many.field(BLIK_FIELD_CELLS).sizes(MOST_CELLS, cells));
-        }
+        let cells = wanted_cells(cells, solution.coupling)?;
         let wanted = lane_bytes()? * runner.lanes();
         let work = |given: &mut [u8]| {
             follow(views, given, &mut runner, |view, memory| {
                 let direction = directions.get(3 * view..).and_then(|d| d.first_chunk::<3>()).copied();
                 let direction = Vec3::from_array(direction.unwrap_or_default());
-                let measured = measure(solution, direction, cells, memory, |band, signature| {
+                let measured = measure(&solution.solved(), direction, cells, memory, |band, signature| {
                     out.put(view * bands + band, signature);
                 });
                 measured.map_err(|error| blik_error { index: view, ..error })
@@ -581,7 +585,7 @@ pub unsafe extern "C" fn blik_signatures(
 }
 
 /// The caller's array of signatures, whose header may have shorter ones.
-struct Signatures {
+pub(crate) struct Signatures {
     start: Start<u8>,
     stride: usize,
 }
@@ -592,7 +596,7 @@ impl Signatures {
 
     /// # Safety
     /// `at` is null or has room for `count` entries of `stride` bytes.
-    unsafe fn new(
+    pub unsafe fn new(
         at: *mut blik_signature,
         count: usize,
         wanted: usize,
@@ -612,7 +616,7 @@ impl Signatures {
     }
 
     /// Writes an entry, which nobody else does.
-    fn put(&self, index: usize, value: blik_signature) {
+    pub fn put(&self, index: usize, value: blik_signature) {
         let size = self.stride.min(size_of::<blik_signature>());
         // SAFETY: within the caller's array by the promise of `new` and the indices of the views.
         unsafe {
@@ -623,23 +627,33 @@ impl Signatures {
 }
 
 /// Measures one view; `put` takes the signature of each band.
-fn measure(
-    solution: &blik_solution,
+pub(crate) fn measure(
+    solved: &Solved<'_>,
     forward: Vec3,
     cells: usize,
     scratch: &mut [u8],
     put: impl Fn(usize, blik_signature),
 ) -> Result<(), blik_error> {
-    let solved = solution.solved();
-    let view = View::new(&solved, forward, cells)?;
+    let view = View::new(solved, forward, cells)?;
     let (scratch, rest) = scratch.split_at_mut_checked(signature::scratch_bytes()?).unwrap_or_default();
-    let sums = signature::whole(&solved, &view, scratch)?;
-    let background = Arena::new(rest, 0)?.take::<f64>(solution.record.shape.bands)?;
-    if let Some(sky) = &solution.light.sky {
+    let sums = signature::whole(solved, &view, scratch)?;
+    let background = Arena::new(rest, 0)?.take::<f64>(solved.shape.bands)?;
+    signatures_of((solved, sums, background), forward, put);
+    Ok(())
+}
+
+/// What the sums of a view along `forward` say of each band; `background` has room for a value of each.
+pub(crate) fn signatures_of(
+    (solved, sums, background): (&Solved<'_>, &Sums, &mut [f64]),
+    forward: Vec3,
+    mut put: impl FnMut(usize, blik_signature),
+) {
+    let background = background.get_mut(..solved.shape.bands).unwrap_or_default();
+    if let Some(sky) = &solved.light.sky {
         sky.radiance(blik_kernel::math::unit(forward).unwrap_or(forward), &mut *background);
     }
     for (band, &mut background) in background.iter_mut().enumerate() {
-        let reference = solution.solved().reference.get(band).copied().unwrap_or(0.0);
+        let reference = solved.reference.get(band).copied().unwrap_or(0.0);
         let own = Signature::new(sums, band, reference, background);
         let signature = blik_signature {
             radiant_intensity: own.intensity,
@@ -652,7 +666,6 @@ fn measure(
         };
         put(band, signature);
     }
-    Ok(())
 }
 
 /// Area, mean irradiance (all that arrives, not divided by pi) and diffuse radiance of facets. Degenerate facets: zeros.

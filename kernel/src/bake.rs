@@ -28,7 +28,7 @@ use crate::scene::{MAX_BANDS, Scene};
 use crate::settings::{self, Settings};
 
 /// Version of the layout; another one is refused.
-pub const VERSION: u64 = 5;
+pub const VERSION: u64 = 6;
 
 /// "BLIKBAKE"; its bytes tell the byte order.
 const MAGIC: u64 = u64::from_le_bytes(*b"BLIKBAKE");
@@ -67,6 +67,8 @@ pub struct Solution<'m> {
     pub sky: Option<SkyInput<'m>>,
     /// The sun.
     pub sun: Option<SunInput<'m>>,
+    /// As [`light::Light::emission`].
+    pub emission: &'m [f64],
     /// The solved scene.
     pub record: solution::Solution<'m>,
 }
@@ -82,6 +84,8 @@ plain_struct! {
         pub sun_direction: [f64; 3],
         /// Half angle of the sun.
         pub half_angle_deg: f64,
+        /// 1 where facets have an emission of their own.
+        pub emission: u64,
         /// 1 where mirrors reflect sunlight onto facets.
         pub images: u64,
         /// 1 where outlines tell the straight sky.
@@ -230,6 +234,9 @@ impl<'m> Baked<'m> {
         let shape = settings::shape(max_bounces, scene.bands());
         let solved = head.solved == 1;
         let solution = solved.then(|| Solution::get(&mut view, &elements, shape)).transpose()?;
+        if let Some(solution) = &solution {
+            solution.light(&scene)?;
+        }
         Ok(Baked { scene, bvh, elements, blocks, settings, solution })
     }
 }
@@ -261,6 +268,7 @@ impl<'m> Solution<'m> {
         }
         let solution::Solution { reference, irradiance, straight, sun, images, variance, numbers, .. } =
             self.record;
+        head.emission = u64::from(!self.emission.is_empty());
         head.images = u64::from(!images.slots.is_empty());
         head.straight = u64::from(!straight.variance.is_empty());
         writer.put(&[head])?;
@@ -268,6 +276,7 @@ impl<'m> Solution<'m> {
         put_bands(writer, ground, bands)?;
         put_bands(writer, self.sun.map_or(&[], |s| s.irradiance), bands)?;
         writer.put(samples)?;
+        writer.put(self.emission)?;
         writer.put(&[numbers])?;
         writer.put(reference)?;
         writer.put(irradiance)?;
@@ -297,6 +306,8 @@ impl<'m> Solution<'m> {
         if let Some(sun) = &sun {
             Sun::new(sun, bands)?;
         }
+        let emitters = if head.emission != 0 { elements.facet_sides() } else { 0 };
+        let emission = view.take::<f64>(emitters.checked_mul(bands).ok_or(Error::Block)?)?;
         let numbers = view.take::<Numbers>(1)?.first().copied().ok_or(Error::Block)?;
         let reference = view.take::<f64>(bands)?;
         let irradiance = view.take::<f64>(unknowns.checked_mul(shape.stride()).ok_or(Error::Block)?)?;
@@ -321,7 +332,7 @@ impl<'m> Solution<'m> {
             variance,
             numbers,
         };
-        let solution = Solution { sky, sun, record };
+        let solution = Solution { sky, sun, emission, record };
         solution.check()?;
         Ok(solution)
     }
@@ -344,7 +355,8 @@ impl<'m> Solution<'m> {
     }
 
     /// The kernel's light.
-    pub fn light(&self, bands: usize) -> Result<light::Light<'m>, Error> {
-        light::Light::new(self.sky.as_ref(), self.sun.as_ref(), bands)
+    pub fn light(&self, scene: &Scene<'_>) -> Result<light::Light<'m>, Error> {
+        light::LightInput { sky: self.sky, sun: self.sun, emission: self.emission, reference: None }
+            .light(scene)
     }
 }

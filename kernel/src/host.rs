@@ -4,10 +4,12 @@
 //! The stages stay apart: [`Host::geometry`] once per mesh, [`Host::light`] for each light, [`Host::image`] and
 //! [`Host::signature`] for each view. A new light traces no visibility rays, a new view solves nothing.
 
+mod lights;
 mod report;
 mod rounds;
 mod run;
 
+pub use lights::{Explanation, LightReport, Wanted};
 pub use report::*;
 pub use rounds::Rounds;
 use run::{Progress, Run};
@@ -25,7 +27,7 @@ use crate::radiosity::solution::{Numbers, Solution, SolutionMemory, SolutionSize
 use crate::radiosity::straight::Straight;
 use crate::radiosity::sun_image::SunImages;
 use crate::rays::bvh::Bvh;
-use crate::scene::light::{self, Light};
+use crate::scene::light::{self, Light, LightInput};
 use crate::scene::sky::SkyInput;
 use crate::scene::sun::SunInput;
 use crate::scene::{Scene, SceneInput};
@@ -300,21 +302,26 @@ impl Host {
         sky: Option<&SkyInput<'g>>,
         sun: Option<&SunInput<'g>>,
     ) -> Result<Lit<'g>, Error> {
-        // within the pool at once: each stage of its own would wake and wait for it
-        self.pool.install(|| self.light_within(geometry, sky, sun))
+        let (sky, sun) = (sky.copied(), sun.copied());
+        self.light_of(geometry, &LightInput { sky, sun, ..LightInput::default() })
     }
 
-    fn light_within<'g>(
-        &self,
-        geometry: &'g Geometry<'g>,
-        sky: Option<&SkyInput<'g>>,
-        sun: Option<&SunInput<'g>>,
-    ) -> Result<Lit<'g>, Error> {
+    /// As [`Host::light`], of any light: sky, sun, an emission of each facet in place of the materials', and a reference
+    /// radiance in place of that of [`Settings::reference_radiance`]. New temperatures are another emission: no ray is
+    /// traced for them.
+    ///
+    /// # Errors
+    /// Those of [`Host::light`], and what [`LightInput::light`] refuses.
+    pub fn light_of<'g>(&self, geometry: &'g Geometry<'g>, input: &LightInput<'g>) -> Result<Lit<'g>, Error> {
+        // within the pool at once: each stage of its own would wake and wait for it
+        self.pool.install(|| self.light_within(geometry, input))
+    }
+
+    fn light_within<'g>(&self, geometry: &'g Geometry<'g>, input: &LightInput<'g>) -> Result<Lit<'g>, Error> {
         let Geometry { scene, bvh, elements, settings, .. } = geometry;
-        let bands = scene.bands();
         let mut report = geometry.report.clone();
         let mut clock = Clock::start();
-        let light = Light::new(sky, sun, bands)?;
+        let light = input.light(scene)?;
         let coupling = geometry.coupling()?;
         let lighting = Lighting { scene, bvh, elements, coupling: &coupling, light: &light, settings };
         let sizes = Sizes::new((scene, bvh), elements, &light, settings)?;
@@ -323,7 +330,7 @@ impl Host {
         let mut scratch = Memory::new(sizes.scratch().bytes()?);
         let mut scratch = sizes.take_scratch(&mut Arena::new(scratch.bytes_mut(), 0)?)?;
         let (mut memory, mut run) = (tables.memory(), Run::new(self));
-        let given = geometry.reference.as_deref();
+        let given = input.reference.or(geometry.reference.as_deref());
         let mut sun_rays = lighting.direct(given, &mut memory, &mut scratch, &mut run)?;
         let (mut beams, mut bytes) = (Beams::default(), sizes.beams(run.lanes()));
         while let Err(error) =
@@ -343,7 +350,7 @@ impl Host {
         report.sweeps = numbers.sweeps as u32;
         report.certified.solver = numbers.solver;
         report.reference_radiance = tables.reference.clone();
-        report.reference_from = match (&geometry.reference, &light.sky, &light.sun) {
+        report.reference_from = match (given, &light.sky, &light.sun) {
             (Some(_), ..) => "given",
             (None, None, None) => "what emission lights",
             _ => "sky and sun",
@@ -529,21 +536,7 @@ impl Lit<'_> {
 
     /// What the sums over all cells of a signature along `forward` say, and their rays.
     fn signature(&self, forward: Vec3, sums: &Sums) -> (SignatureReport, u64) {
-        let bands = self.shape.bands;
-        let mut background = std::vec![0.0; bands];
-        if let Some(sky) = &self.light.sky {
-            sky.radiance(forward, &mut background);
-        }
-        let of = |band: usize| Signature::new(sums, band, self.reference()[band], background[band]);
-        let report = SignatureReport {
-            radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
-            projected_area: sums.area,
-            mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
-            contrast: (0..bands).map(|b| of(b).contrast).collect(),
-            error: (0..bands).map(|b| of(b).error).collect(),
-            unresolved_glints: (0..bands).map(|b| of(b).unresolved).collect(),
-        };
-        (report, sums.rays)
+        (signature_report(&self.light, self.reference(), forward, sums), sums.rays)
     }
 
     /// Reference radiance, one value per band.
@@ -578,6 +571,21 @@ impl Lit<'_> {
                 each(facet, side, scene.area(facet), &irradiance, &radiance);
             }
         }
+    }
+}
+
+/// What the sums over all cells of a signature along `forward` say.
+fn signature_report(light: &Light<'_>, reference: &[f64], forward: Vec3, sums: &Sums) -> SignatureReport {
+    let bands = reference.len();
+    let background = lights::background(light, forward, bands);
+    let of = |band: usize| Signature::new(sums, band, reference[band], background[band]);
+    SignatureReport {
+        radiant_intensity: (0..bands).map(|b| of(b).intensity).collect(),
+        projected_area: sums.area,
+        mean_radiance: (0..bands).map(|b| of(b).mean_radiance).collect(),
+        contrast: (0..bands).map(|b| of(b).contrast).collect(),
+        error: (0..bands).map(|b| of(b).error).collect(),
+        unresolved_glints: (0..bands).map(|b| of(b).unresolved).collect(),
     }
 }
 

@@ -101,7 +101,7 @@ pub use radiosity::{accuracy, beam, solver, sun_image};
 pub use rays::surface as mirror;
 pub use rays::{bvh, ray};
 pub use scene::{lobe, sky, sun};
-pub use view::{camera, chain, facets, image, raster, signature};
+pub use view::{camera, chain, facets, image, importance, raster, signature};
 
 /// Light and its direct part under one name, as callers of version 0.1 know them.
 pub mod light {

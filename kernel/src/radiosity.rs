@@ -5,6 +5,7 @@
 //! that would take many sweeps, [`crate::radiosity::solver`] makes the most of few.
 
 pub mod accuracy;
+pub mod adjoint;
 pub mod beam;
 pub mod direct;
 pub mod limits;
@@ -65,7 +66,7 @@ impl System<'_> {
     /// Radiance before any reflection of the sides of `range`: their emission.
     pub fn start(&self, range: Range<usize>, radiance: &mut [f64]) {
         for (unknown, out) in range.zip(pieces(radiance, self.shape.bands)) {
-            copy(out, self.scene.emission(self.material(unknown)));
+            copy(out, self.emission(unknown));
         }
     }
 
@@ -91,7 +92,7 @@ impl System<'_> {
         let sums = sums.head_mut(bands);
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
             let material = self.material(unknown);
-            let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
+            let (diffuse, emission) = (self.scene.diffuse(material), self.emission(unknown));
             row.gather(from, sums);
             let direct = self.direct.part(self.shape.at(unknown, 0));
             let scale = PI * self.scale(unknown, &row);
@@ -323,7 +324,7 @@ impl System<'_> {
             for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
                 let facet = self.elements.facet_of(unknown).0;
                 let area = self.scene.areas().at(facet) * self.elements.share(unknown);
-                sent += area * self.scene.emission(self.scene.material(facet)).at(band);
+                sent += area * self.emission(unknown).at(band);
                 if self.scene.diffuse(self.scene.material(facet)).at(band) > 0.0 {
                     let area = area * f64::from(row.row.visible_share);
                     sum += area * irradiance.at(self.shape.at(unknown, self.shape.levels - 1).start + band);
@@ -342,7 +343,7 @@ impl System<'_> {
     pub fn reflect(&self, range: Range<usize>, level: usize, irradiance: &[f64], out: &mut [f64]) {
         for (unknown, out) in range.zip(pieces(out, self.shape.bands)) {
             let material = self.material(unknown);
-            let (diffuse, emission) = (self.scene.diffuse(material), self.scene.emission(material));
+            let (diffuse, emission) = (self.scene.diffuse(material), self.emission(unknown));
             let mean = irradiance.part(self.shape.at(unknown, level));
             for (band, out) in out.iter_mut().enumerate() {
                 let sun = self.light.sun.as_ref().map_or(0.0, |s| self.sun.at(unknown) * s.irradiance(band));
@@ -359,6 +360,13 @@ impl System<'_> {
 
     fn material(&self, unknown: usize) -> usize {
         self.scene.material(self.elements.facet_of(unknown).0)
+    }
+
+    /// Own diffuse radiance, one value per band.
+    #[inline]
+    fn emission(&self, unknown: usize) -> &[f64] {
+        let (facet, side) = self.elements.facet_of(unknown);
+        self.light.emission(self.scene, facet, side)
     }
 }
 

@@ -4,15 +4,19 @@
 //! The owning layer runs ranges on its pool, the C library on its caller's threads, tests in a loop ([`Executor`]). All
 //! else is decided here, so that all of them give the same bits.
 
+mod adjoint;
 mod beams;
 mod geometry;
 mod light;
+mod lights;
 mod solve;
 mod straight;
 
+pub use adjoint::{AdjointMemory, AdjointReport};
 pub use beams::Beams;
 pub use geometry::{BlockMemory, BlockPlace, CouplingRows, least_bytes, places, refine};
 pub use light::{Lighting, Scratch, Sizes};
+pub use lights::{Alone, Explained, KeptSky, Lights};
 
 use crate::base::error::Error;
 use core::num::NonZeroUsize;

@@ -5,5 +5,6 @@ pub mod chain;
 pub mod estimate;
 pub mod facets;
 pub mod image;
+pub mod importance;
 pub mod raster;
 pub mod signature;

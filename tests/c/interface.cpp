@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <limits>
@@ -59,6 +60,35 @@ int main() {
     const std::vector<std::array<double, 3>> directions = {{-1, 0, -1}, {0, 0, -1}};
     const std::vector<blik_signature> signatures = solution.signatures(directions, blik::threads(2));
     REQUIRE(signatures.size() == 4 && signatures[2].projected_area > 0.99 && signatures[2].projected_area < 1.01);
+
+    // many lights at once are each alone; an emission of its own warms what it shines on
+    std::vector<blik::light> lights = {blik::light(sky, blik::sun({1, 0, 1})), blik::light(sky), blik::light()};
+    lights[2].emission(std::vector<double>(4 * 2, 0.25)).reference_radiance({1, 1});
+    const blik::lit all = blik::lights(coupling, lights, directions, blik::threads(2));
+    REQUIRE(all.irradiance.size() == 3 * 8 && all.signatures.size() == 3 * 4);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+        const blik::solution one(coupling, lights[i]);
+        const blik::facets each = one.facets();
+        REQUIRE(std::equal(each.irradiance.begin(), each.irradiance.end(), all.irradiance.begin() + 8 * i));
+        REQUIRE(std::equal(each.radiance.begin(), each.radiance.end(), all.radiance.begin() + 8 * i));
+        REQUIRE(one.signatures(directions)[3].radiant_intensity == all.signatures[4 * i + 3].radiant_intensity);
+    }
+    REQUIRE(all.radiance[16] > 0.25 && blik::lights(coupling, {}).irradiance.empty());
+
+    // what a signature is made of adds up to it
+    const blik::explanation why = blik::explain(coupling, lights[0], directions);
+    REQUIRE(why.signatures[3].radiant_intensity == all.signatures[3].radiant_intensity);
+    REQUIRE(why.shares.size() == 16 && why.by_diffuse.size() == 16 && why.by_emission.size() == 16 && why.terms.size() == 12);
+    double shares = 0, terms = 0;
+    for (std::size_t facet = 0; facet < 4; ++facet) {
+        shares += why.shares[8 + 2 * facet + 1];
+    }
+    for (std::size_t term = 0; term < 3; ++term) {
+        terms += why.terms[6 + 2 * term + 1];
+    }
+    const double whole = why.signatures[3].radiant_intensity;
+    REQUIRE(std::abs(shares - whole) < 1e-12 * whole && std::abs(terms - whole) < 1e-12 * whole);
+    REQUIRE(why.by_diffuse[8] > 0 && why.by_emission[8] > 0);
 
     std::vector<blik_ray> rays(1);
     rays[0] = {{0.5, 0.5, 2}, {0, 0, -1}, 1e9, BLIK_NO_FACET};

@@ -137,6 +137,26 @@ fn pixels_in_spite_of(fault: fn(u32) -> Fault, scene_too: bool) -> Vec<u32> {
             blik_solution_create(made.coupling, light, run, null_mut(), to)
         })
     });
+    for number in 1.. {
+        let (mut written, before) = (None, BYTES.get());
+        let done = disturbed(fault(number), |run| {
+            match explain(made.coupling, &inputs, run)
+                .and_then(|bits| lights(made.coupling, &inputs, run).map(|more| [bits, more].concat()))
+            {
+                Ok(bits) => {
+                    written = Some(bits.len());
+                    BLIK_OK
+                }
+                Err(status) => status,
+            }
+        });
+        assert_eq!(BYTES.get(), before, "lights: fault {number} left memory");
+        assert_eq!(done, written.is_some());
+        if done {
+            assert!(number > 1, "no fault happened");
+            break;
+        }
+    }
     image(made.solution, &inputs).unwrap()
 }
 

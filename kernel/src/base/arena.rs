@@ -119,7 +119,7 @@ impl Need {
     }
 }
 
-/// Hands out zeroed, aligned slices of the caller's memory, front to back.
+/// Hands out aligned slices of the caller's memory, front to back, zeroed but where they are kept.
 #[derive(Debug)]
 pub struct Arena<'m> {
     rest: &'m mut [u8],
@@ -140,8 +140,17 @@ impl<'m> Arena<'m> {
     }
 
     /// The next `count` values of type `T`, all zero.
-    #[allow(unsafe_code)]
     pub fn take<T: Plain>(&mut self, count: usize) -> Result<&'m mut [T], Error> {
+        self.carve(count, true)
+    }
+
+    /// The next `count` values of type `T`, as the memory holds them: those that an arena over the same memory left, or any.
+    pub fn keep<T: Plain>(&mut self, count: usize) -> Result<&'m mut [T], Error> {
+        self.carve(count, false)
+    }
+
+    #[allow(unsafe_code)]
+    fn carve<T: Plain>(&mut self, count: usize, clear: bool) -> Result<&'m mut [T], Error> {
         let skip = self.rest.as_ptr().align_offset(ALIGNMENT);
         let needed = Need::new().and::<T>(count).bytes()?;
         let size = (needed - (ALIGNMENT - 1)).min(count.saturating_mul(size_of::<T>()));
@@ -153,10 +162,12 @@ impl<'m> Arena<'m> {
         let (head, tail) = core::mem::take(&mut self.rest).split_at_mut_checked(end).ok_or(short)?;
         self.rest = tail;
         let (_, bytes) = head.split_at_mut_checked(skip).ok_or(short)?;
-        bytes.fill(0);
+        if clear {
+            bytes.fill(0);
+        }
         const { assert!(align_of::<T>() <= ALIGNMENT) };
         // SAFETY: `bytes` is a unique borrow for 'm of `count * size_of::<T>()` initialised bytes, aligned to
-        // ALIGNMENT >= align_of::<T>() (checked above), and all-zero bytes are a value of the plain type T.
+        // ALIGNMENT >= align_of::<T>() (checked above), and any bytes are a value of the plain type T.
         Ok(unsafe { core::slice::from_raw_parts_mut(bytes.as_mut_ptr().cast::<T>(), count) })
     }
 }

@@ -147,7 +147,19 @@ pub enum Error {
         band: usize,
         sum: f64,
     },
-    /// A light's array has not one value per band.
+    /// A facet's value is not finite or outside its range.
+    FacetRange {
+        facet: usize,
+        band: usize,
+        field: Field,
+        value: f64,
+    },
+    /// A facet sends or receives light for which the coupling has no entries: it was made for another material.
+    Uncoupled {
+        facet: usize,
+        field: Field,
+    },
+    /// A light's array has not one value per band, or per facet, side and band.
     LightBandCount {
         field: Field,
         expected: usize,
@@ -228,8 +240,14 @@ impl fmt::Display for Error {
             Error::ReflectanceSum { material, band, sum } => {
                 write!(f, "material {material}, band {band}: diffuse + specular = {sum} exceeds 1")
             }
+            Error::FacetRange { facet, band, field, value } => {
+                write!(f, "facet {facet}, band {band}: {} {value} is out of range", field.name())
+            }
+            Error::Uncoupled { facet, field } => {
+                write!(f, "facet {facet}: {}: the coupling was made without entries for it", field.name())
+            }
             Error::LightBandCount { field, expected, given } => {
-                write!(f, "{}: expected {expected} values (one per band), got {given}", field.name())
+                write!(f, "{}: expected {expected} values, got {given}", field.name())
             }
             Error::Range { field, band, value } => {
                 write!(f, "{}: value {value} (band {band}) is out of range", field.name())

@@ -173,8 +173,7 @@ pub fn rows(
 
 /// Whether there is no light at all.
 fn is_dark(system: &System<'_>) -> bool {
-    let shines = |material: usize| system.scene.emission(material).iter().any(|l| *l > 0.0);
-    system.light.sky.is_none() && system.light.sun.is_none() && !(0..system.scene.materials()).any(shines)
+    system.light.sky.is_none() && system.light.sun.is_none() && !system.light.emits(system.scene)
 }
 
 fn check(given: usize, expected: usize) -> Result<(), Error> {

@@ -4,7 +4,7 @@ use crate::base::error::{Error, Field};
 use crate::base::index::Index;
 use crate::base::math::{PI, TAU, Vec3, cos, sin, sqrt};
 use crate::base::qmc::Sequence;
-use crate::scene::sky::{Sky, SkyInput};
+use crate::scene::sky::{RADIANCE_LARGEST, Sky, SkyInput};
 use crate::scene::sun::{Sun, SunInput};
 use crate::scene::{MAX_BANDS, Scene};
 
@@ -15,6 +15,35 @@ pub struct Light<'a> {
     pub sky: Option<Sky<'a>>,
     /// The sun, if any.
     pub sun: Option<Sun<'a>>,
+    /// Own diffuse radiance of each facet, side and band, bands innermost, W m-2 sr-1, in place of the materials' emission;
+    /// empty: the materials' ([`Light::with_emission`]).
+    pub emission: &'a [f64],
+}
+
+/// What a light is made from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightInput<'a> {
+    /// The sky, if any.
+    pub sky: Option<SkyInput<'a>>,
+    /// The sun, if any.
+    pub sun: Option<SunInput<'a>>,
+    /// As [`Light::emission`].
+    pub emission: &'a [f64],
+    /// The radiance per band to which errors are related; `None`: from the light.
+    pub reference: Option<&'a [f64]>,
+}
+
+impl<'a> LightInput<'a> {
+    /// The light of a scene, checked.
+    ///
+    /// # Errors
+    /// What [`Light::new`], [`Light::with_emission`] and [`check_reference`] refuse.
+    pub fn light(&self, scene: &Scene<'_>) -> Result<Light<'a>, Error> {
+        if let Some(reference) = self.reference {
+            check_reference(reference, scene.bands())?;
+        }
+        Light::new(self.sky.as_ref(), self.sun.as_ref(), scene.bands())?.with_emission(scene, self.emission)
+    }
 }
 
 impl<'a> Light<'a> {
@@ -34,11 +63,59 @@ impl<'a> Light<'a> {
             (Some(sky), None) => sky.take_sun().map(|(spot, factors)| Sun::of_spot(&spot, factors)),
             _ => None,
         };
-        Ok(Light { sky, sun: sun.or(spot) })
+        Ok(Light { sky, sun: sun.or(spot), emission: &[] })
+    }
+
+    /// The same with an emission of its own: `values` for each facet, side and band, bands innermost, 0..=1e37 W m-2 sr-1; empty:
+    /// the materials'. A new emission asks for no rays.
+    ///
+    /// # Errors
+    /// [`Error::LightBandCount`] for another number of values, [`Error::FacetRange`] for one out of range, and
+    /// [`Error::Uncoupled`] where a facet emits whose material neither reflects diffusely nor emits: couplings have no entries
+    /// for what it sends.
+    pub fn with_emission(self, scene: &Scene<'_>, values: &'a [f64]) -> Result<Light<'a>, Error> {
+        let stride = scene.sides() * scene.bands();
+        let (expected, field) = (scene.facets() * stride, Field::Emission);
+        if !values.is_empty() && values.len() != expected {
+            return Err(Error::LightBandCount { field, expected, given: values.len() });
+        }
+        for (at, &value) in values.iter().enumerate() {
+            let (facet, band) = (at / stride.max(1), at % scene.bands().max(1));
+            if !(0.0..=RADIANCE_LARGEST).contains(&value) {
+                return Err(Error::FacetRange { facet, band, field, value });
+            }
+            if value > 0.0 && scene.areas().at(facet) > 0.0 && !scene.glows(scene.material(facet)) {
+                return Err(Error::Uncoupled { facet, field });
+            }
+        }
+        Ok(Light { emission: values, ..self })
     }
 }
 
 impl Light<'_> {
+    /// Own diffuse radiance of a facet's side, one value per band.
+    #[inline(always)]
+    pub fn emission<'s>(&'s self, scene: &Scene<'s>, facet: usize, side: usize) -> &'s [f64] {
+        if self.emission.is_empty() {
+            return scene.emission(scene.material(facet));
+        }
+        let start = (facet * scene.sides() + side) * scene.bands();
+        self.emission.part(start..start + scene.bands())
+    }
+
+    /// Largest emission of the scene in one band.
+    pub fn largest_emission(&self, scene: &Scene<'_>, band: usize) -> f64 {
+        if self.emission.is_empty() {
+            return scene.largest_emission(band);
+        }
+        self.emission.iter().skip(band).step_by(scene.bands().max(1)).fold(0.0, |a, &b| f64::max(a, b))
+    }
+
+    /// Whether any facet emits.
+    pub fn emits(&self, scene: &Scene<'_>) -> bool {
+        (0..scene.bands()).any(|band| self.largest_emission(scene, band) > 0.0)
+    }
+
     /// Reference radiance of each band; returns, as bits, the bands without light from sky or sun.
     ///
     /// It is max(E_up, E_down)/pi + E_sun/pi with the unobstructed sky irradiances of planes that face +-up; in a band
@@ -65,7 +142,7 @@ impl Light<'_> {
         }
         let mut dark = 0;
         for (band, o) in out.iter_mut().enumerate().filter(|(_, o)| **o == 0.0) {
-            *o = scene.largest_emission(band);
+            *o = self.largest_emission(scene, band);
             dark |= 1 << (band % MAX_BANDS);
         }
         dark

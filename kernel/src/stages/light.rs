@@ -49,6 +49,8 @@ pub struct Sizes {
     beams: usize,
     /// Bytes in which the straight sky of elements is evaluated.
     lookers: usize,
+    /// Whether radiances of the first pass are kept.
+    first: bool,
 }
 
 /// Memory of a light's stages beside the solution's, from [`Sizes::scratch`].
@@ -65,6 +67,8 @@ pub struct Scratch<'m> {
     /// solution.
     pub(super) dark: u64,
     pub(super) lookers: &'m mut [u8],
+    /// Radiances of the first of both passes, where they are kept.
+    pub(super) first: &'m mut [f64],
 }
 
 /// Settings of the beams that a scene's mirrors reflect of a light's sun; `None` where there are no such beams.
@@ -99,7 +103,18 @@ impl Sizes {
             orders: if shape.levels == 1 { sweeps() } else { shape.levels + 1 },
             beams,
             lookers: if straight { super::straight::bytes(scene.bands())? } else { 0 },
+            first: false,
         })
+    }
+
+    /// The same with room for the radiances of the first pass, which [`Lighting::differentiate`] needs.
+    pub fn keeping_first(self) -> Sizes {
+        Sizes { first: true, ..self }
+    }
+
+    /// Values of [`Scratch::first`].
+    fn first(&self) -> usize {
+        if self.first { self.solution.values() } else { 0 }
     }
 
     /// Bytes of [`Scratch`].
@@ -112,6 +127,7 @@ impl Sizes {
             .and::<f32>(2 * values)
             .and::<f32>(self.spread())
             .and::<u8>(self.lookers)
+            .and::<f64>(self.first())
     }
 
     /// Values of [`Scratch::spread`].
@@ -130,6 +146,7 @@ impl Sizes {
             spread: arena.take(self.spread())?,
             dark: 0,
             lookers: arena.take(self.lookers)?,
+            first: arena.take(self.first())?,
         })
     }
 
@@ -157,7 +174,19 @@ impl Lighting<'_> {
         scratch: &mut Scratch<'_>,
         run: &mut X,
     ) -> Result<u64, X::Error> {
-        let Lighting { scene, bvh, elements, coupling, light, settings } = *self;
+        self.begin(given, memory, scratch)?;
+        self.sky(memory, scratch, run)?;
+        self.sun(memory, run)
+    }
+
+    /// The reference radiance.
+    pub(super) fn begin(
+        &self,
+        given: Option<&[f64]>,
+        memory: &mut SolutionMemory<'_>,
+        scratch: &mut Scratch<'_>,
+    ) -> Result<(), Error> {
+        let Lighting { scene, light, .. } = *self;
         limits::check_highlights(scene, light)?;
         scratch.dark = match given {
             Some(given) => {
@@ -166,6 +195,17 @@ impl Lighting<'_> {
             }
             None => light.reference_radiance(scene, memory.reference),
         };
+        Ok(())
+    }
+
+    /// The sky's part of the direct light.
+    pub(super) fn sky<X: Executor>(
+        &self,
+        memory: &mut SolutionMemory<'_>,
+        scratch: &mut Scratch<'_>,
+        run: &mut X,
+    ) -> Result<(), X::Error> {
+        let Lighting { scene, elements, coupling, light, settings, .. } = *self;
         let shape = settings::shape(settings.max_bounces, scene.bands());
         match &light.sky {
             None => scratch.direct.fill(0.0),
@@ -179,6 +219,16 @@ impl Lighting<'_> {
                 })?;
             }
         }
+        Ok(())
+    }
+
+    /// The share of the sun's irradiance that arrives straight; returns the rays toward it.
+    pub(super) fn sun<X: Executor>(
+        &self,
+        memory: &mut SolutionMemory<'_>,
+        run: &mut X,
+    ) -> Result<u64, X::Error> {
+        let Lighting { scene, bvh, elements, coupling, light, .. } = *self;
         let Some(sun) = &light.sun else {
             memory.sun.fill(0.0);
             return Ok(0);

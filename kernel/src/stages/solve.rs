@@ -3,7 +3,7 @@
 
 use super::light::{Lighting, SHARES, Scratch};
 use super::{Executor, Largest};
-use crate::base::index::{Index, IndexMut, pieces};
+use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::narrow;
 use crate::radiosity::System;
 use crate::radiosity::accuracy::{self, Own};
@@ -37,7 +37,7 @@ pub(super) fn solve<'m, X: Executor>(
     } = memory;
     let (sun, images) = (&*sun, SunImages { slots, reflected_irradiance });
     let shape = crate::settings::shape(settings.max_bounces, scene.bands());
-    let Scratch { direct, orders, own, carried, spread, dark, .. } = scratch;
+    let Scratch { direct, orders, own, carried, spread, dark, first: kept, .. } = scratch;
     let size = elements.unknowns() * shape.bands;
     let seen = Straight { values: straight, variance: straight_variance };
     let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
@@ -45,6 +45,7 @@ pub(super) fn solve<'m, X: Executor>(
     if shape.levels == 1 {
         let first = Solve { system: System { direct, ..system }, settings, reference: &*reference };
         before = first.run(orders, irradiance, &mut bounds, run)?.map_or(0, |s| s.done);
+        copy(kept, orders.part(0..size));
         system.lit_radiance(*dark, irradiance, reference);
         let missed = orders.part_mut(size..2 * size);
         run.rows(missed, shape.bands, 0.0, |range, out| {
@@ -96,8 +97,9 @@ pub(super) fn solve<'m, X: Executor>(
 /// which lamps are brighter than the reference radiance.
 fn add_lamps(system: &System<'_>, reference: &[f64], dark: u64, variance: &mut [f32]) {
     let bands = (0..system.shape.bands).filter(|band| dark >> band & 1 == 1 && reference.at(*band) > 0.0);
-    let glare =
-        bands.map(|band| system.scene.largest_emission(band) / reference.at(band)).fold(0.0, f64::max);
+    let glare = bands
+        .map(|band| system.light.largest_emission(system.scene, band) / reference.at(band))
+        .fold(0.0, f64::max);
     if glare <= 1.0 {
         return;
     }

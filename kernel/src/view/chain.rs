@@ -28,6 +28,7 @@ use crate::rays::surface::{Mirror, Surface};
 use crate::scene::light::Light;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::view::camera::Camera;
+use crate::view::importance::Importance;
 use core::ops::Deref;
 use occluders::RayKind;
 
@@ -310,6 +311,8 @@ struct Mode<'w, 'm> {
     occluders: &'w mut OccluderCache<'m>,
     /// Whether the first lobe ends it where the ray stands for itself.
     branches: bool,
+    /// Where it is noted what the ray's radiance depends on.
+    importance: Option<&'w mut Importance<'m>>,
 }
 
 /// A chain on its way.
@@ -441,11 +444,23 @@ impl Solved<'_> {
     /// As [`Solved::radiance_at`], with a cache of occluders: fewer rays, and the same bits.
     pub(crate) fn radiance_with(
         &self,
-        (ray, hit): (&Ray, Option<Hit>),
+        seen: (&Ray, Option<Hit>),
         sample: RaySample,
         terms: &mut Terms,
         work: &mut ChainScratch,
         occluders: &mut OccluderCache<'_>,
+    ) -> Path {
+        self.radiance_noted(seen, sample, terms, work, (occluders, None))
+    }
+
+    /// The same, and notes what the radiance depends on: of rays that are each one of many ([`RaySample::Stratum`]).
+    pub(crate) fn radiance_noted<'m>(
+        &self,
+        (ray, hit): (&Ray, Option<Hit>),
+        sample: RaySample,
+        terms: &mut Terms,
+        work: &mut ChainScratch,
+        (occluders, importance): (&mut OccluderCache<'m>, Option<&mut Importance<'m>>),
     ) -> Path {
         let mut path = Path::default();
         let ChainScratch { throughput: [throughput, next], sums, squares, before, images, gathered } = work;
@@ -465,7 +480,7 @@ impl Solved<'_> {
             step: 0.0,
             onward: None,
         };
-        let mode = &mut Mode { sample, occluders, branches: true };
+        let mode = &mut Mode { sample, occluders, branches: true, importance };
         if let Some(lobe) = self.follow(&mut state, hit, mode, terms, &mut path) {
             let mut samples = LobeSamples {
                 terms: sums,
@@ -701,7 +716,8 @@ impl Solved<'_> {
         copy(samples.throughput.head_mut(bands), state.throughput.head(bands));
         samples.path.rays += 1;
         let sample = RaySample::Stratum { seed: mode.sample.seed(), index: samples.count };
-        let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false };
+        let importance = mode.importance.as_deref_mut();
+        let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false, importance };
         let hit = self.bvh.closest(&ray);
         let PathState { mirrors, lobes, far, imaged, .. } = *state;
         let gathered = state.gathered.take();
@@ -765,9 +781,12 @@ impl Solved<'_> {
     ) {
         let bands = self.shape.bands;
         let to = if state.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
-        let emission = self.scene.emission(surface.material);
+        let emission = self.light.emission(self.scene, surface.facet, surface.side);
         let emitted = to.iter_mut().zip(state.throughput.iter()).zip(emission);
         emitted.for_each(|((to, throughput), own)| *to += throughput * own);
+        if let Some(importance) = mode.importance.as_deref_mut() {
+            importance.meet(surface, state.throughput.head(bands), &*to);
+        }
         let Some(level) = self.level(state.mirrors) else { return };
         let diffuse = self.scene.diffuse(surface.material);
         if diffuse.iter().all(|&d| d == 0.0) {
@@ -822,6 +841,10 @@ impl Solved<'_> {
             // eq. (15): I_d prod rho_s, with the reflected part of eq. (12), I_d = rho_d E/pi
             let share = throughput * rho;
             *to += share * FRAC_1_PI * irradiance;
+        }
+        if let Some(importance) = mode.importance.as_deref_mut() {
+            let at = (unknown, local, open.map_or(1.0, |open| open.ratio));
+            importance.reflect(surface, at, (diffuse, state.throughput.head(bands)), &*to);
         }
         path.variance += weight * weight * variance;
         if counts_signs {

@@ -36,7 +36,7 @@ pub fn side(
         }
     }
     let material = scene.material(facet);
-    let own = scene.emission(material).iter().zip(scene.diffuse(material));
+    let own = solved.light.emission(scene, facet, side).iter().zip(scene.diffuse(material));
     for ((l, e), (emission, diffuse)) in radiance.iter_mut().zip(irradiance).zip(own) {
         *l = emission + diffuse * FRAC_1_PI * *e;
     }

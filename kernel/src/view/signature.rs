@@ -16,6 +16,7 @@ use crate::rays::ray::{Hit, Ray};
 use crate::scene::MAX_BANDS;
 use crate::view::camera::Camera;
 use crate::view::chain::{ChainScratch, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
+use crate::view::importance::Importance;
 use crate::view::raster::{Lines, Samples, Span};
 use core::ops::Range;
 use glints::Glints;
@@ -202,7 +203,7 @@ pub fn rows(
         return Err(Error::Length { what: "signature rows", expected: range.len(), given: out.len() });
     }
     let mut out = out.iter_mut();
-    each_row(solved, view, range, scratch, |_, sums| {
+    each_row(solved, view, range, scratch, None, |_, sums| {
         if let Some(out) = out.next() {
             *out = *sums;
         }
@@ -212,7 +213,17 @@ pub fn rows(
 
 /// The sums over all cells: those of all [`rows`], added in their order. They stand in the scratch memory.
 pub fn whole<'s>(solved: &Solved<'_>, view: &View, scratch: &'s mut [u8]) -> Result<&'s Sums, Error> {
-    each_row(solved, view, 0..view.rows(), scratch, |all, sums| all.add(sums))
+    each_row(solved, view, 0..view.rows(), scratch, None, |all, sums| all.add(sums))
+}
+
+/// The same bits, and what the radiant intensity is made of and depends on, added to `importance`, which is all zero before.
+pub fn explained<'s>(
+    solved: &Solved<'_>,
+    view: &View,
+    scratch: &'s mut [u8],
+    importance: &mut Importance<'_>,
+) -> Result<&'s Sums, Error> {
+    each_row(solved, view, 0..view.rows(), scratch, Some(importance), |all, sums| all.add(sums))
 }
 
 /// Calls `each` with what it made of the rows before, at first nothing, and the sums over row after row.
@@ -221,6 +232,7 @@ fn each_row<'s>(
     view: &View,
     range: Range<usize>,
     scratch: &'s mut [u8],
+    importance: Option<&mut Importance<'_>>,
     mut each: impl FnMut(&mut Sums, &Sums),
 ) -> Result<&'s Sums, Error> {
     let given = scratch.len();
@@ -237,7 +249,8 @@ fn each_row<'s>(
         if own { OccluderCache::new(lists, true, view.cell_area, 1.0) } else { OccluderCache::none() };
     let area = view.cell_area / (solved.scene.scale() * solved.scene.scale());
     let solved = &Solved { settings: solved.settings.of_sums(), ..*solved };
-    let mut tracer = Tracer { solved, view, area, terms, work, occluders };
+    let importance = importance.map(Importance::lend);
+    let mut tracer = Tracer { solved, view, area, terms, work, occluders, importance };
     let flat = view.cell_area == 0.0;
     let samples = !own || flat || solved.scene.facets() / DRAWN_FACETS_PER_CELL > view.cells * view.cells;
     let (mut next, end) = (range.start, range.end);
@@ -270,16 +283,18 @@ struct Tracer<'a> {
     terms: &'a mut Terms,
     work: &'a mut ChainScratch,
     occluders: OccluderCache<'a>,
+    importance: Option<Importance<'a>>,
 }
 
 impl Tracer<'_> {
     /// Adds the glints of a row of facets.
     #[inline(never)]
     fn glints(&mut self, row: usize, sums: &mut Sums) {
-        let Tracer { solved, view, work, .. } = self;
+        let Tracer { solved, view, work, importance, .. } = self;
         let whole = self.area * (view.cells * view.cells) as f64;
         let products = &mut work.images;
-        Glints { solved, forward: view.samples.forward, whole, products }.row(row, sums);
+        let importance = importance.as_mut();
+        Glints { solved, forward: view.samples.forward, whole, products, importance }.row(row, sums);
     }
 
     /// Adds one ray in each cell of a row.
@@ -293,8 +308,9 @@ impl Tracer<'_> {
             let ray = ray_of(column);
             let any = |n| if n == column { ray } else { ray_of(n) };
             let hit = solved.bvh.closest_of(&mut ahead, column, end, any);
-            let path = self.follow(&ray, hit, (row, column), sums);
-            self.add(if hit.is_some() { 1.0 } else { 0.0 }, &path, sums);
+            let cells = if hit.is_some() { 1.0 } else { 0.0 };
+            let path = self.follow(&ray, hit, (row, column), cells, sums);
+            self.add(cells, hit, &path, sums);
         }
     }
 
@@ -342,35 +358,49 @@ impl Tracer<'_> {
             let ray = self.view.samples.ray(row as isize, at);
             let solved = self.solved;
             let hit = solved.bvh.closest_among(&ray, &[span.facet()]).or_else(|| solved.bvh.closest(&ray));
-            let path = self.follow(&ray, hit, (row, at as u32), sums);
-            self.add(share, &path, sums);
+            let path = self.follow(&ray, hit, (row, at as u32), share, sums);
+            self.add(share, hit, &path, sums);
         }
     }
 
     /// Finds the terms of a ray.
     #[inline]
-    fn follow(&mut self, ray: &Ray, hit: Option<Hit>, (row, index): (usize, u32), sums: &mut Sums) -> Path {
+    fn follow(
+        &mut self,
+        ray: &Ray,
+        hit: Option<Hit>,
+        (row, index): (usize, u32),
+        cells: f64,
+        sums: &mut Sums,
+    ) -> Path {
         self.terms.clear(self.solved.shape.bands);
         sums.rays += 1;
         if hit.is_none() {
             return Path::default();
         }
         let sample = RaySample::Stratum { seed: row as u32, index };
-        let (seen, occluders) = ((ray, hit), &mut self.occluders);
-        let path = self.solved.radiance_with(seen, sample, self.terms, self.work, occluders);
+        let mut importance = self.importance.as_mut();
+        if let Some(importance) = importance.as_deref_mut() {
+            importance.weigh(cells * self.area);
+        }
+        let (seen, noted) = ((ray, hit), (&mut self.occluders, importance));
+        let path = self.solved.radiance_noted(seen, sample, self.terms, self.work, noted);
         sums.rays += u64::from(path.rays);
         path
     }
 
     /// Adds the latest terms for `cells` cells.
     #[inline]
-    fn add(&self, cells: f64, path: &Path, sums: &mut Sums) {
+    fn add(&mut self, cells: f64, hit: Option<Hit>, path: &Path, sums: &mut Sums) {
         let area = cells * self.area;
         sums.alike += area * (sqrt(path.variance) + path.tail);
         sums.chance += area * path.chance;
         sums.area += area;
         for (band, i) in sums.intensity.iter_mut().take(self.solved.shape.bands).enumerate() {
             *i += self.terms.sum(band) * area;
+        }
+        if let Some((importance, hit)) = self.importance.as_mut().zip(hit) {
+            importance.add_ray(hit.facet as usize, self.terms);
         }
     }
 }

@@ -356,7 +356,8 @@ impl Solved<'_> {
                 let direction = axes.0 * a + axes.1 * b + gather_point.surface.normal * c;
                 let part = (u64::from(index) * GATHER_SETS as u64 / u64::from(rays)) as usize;
                 let sample = RaySample::Stratum { seed, index };
-                let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false };
+                let occluders = &mut *mode.occluders;
+                let mut mode = Mode { sample, occluders, branches: false, importance: None };
                 self.add_direction((gather_point, direction), part, images, gathered, &mut mode, path)?;
             }
             let [exact, plain] = [true, false].map(|exact| gathered.error(self.reference, rays, exact));

@@ -14,6 +14,7 @@ use crate::scene::lobe::{Highlight, Lobe};
 use crate::scene::sun::Sun;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::view::chain::{NARROW_LOBE_RATIO, Path, Solved};
+use crate::view::importance::Importance;
 
 /// Number of facets in one row of a view that looks for glints.
 pub(super) const GLINT_FACETS: usize = 64;
@@ -86,7 +87,7 @@ impl Part {
 }
 
 /// The looks for glints along one direction.
-pub(super) struct Glints<'a, 'w> {
+pub(super) struct Glints<'a, 'w, 'm> {
     pub solved: &'a Solved<'a>,
     /// From the observer toward the object.
     pub forward: Vec3,
@@ -94,6 +95,8 @@ pub(super) struct Glints<'a, 'w> {
     pub whole: f64,
     /// Products of the reflectances on the way to an image, and sums of what is seen of it.
     pub products: &'w mut [[f64; MAX_BANDS]; 2],
+    /// Where facets' shares are noted.
+    pub importance: Option<&'w mut Importance<'m>>,
 }
 
 /// One facet's side, and the sun or an image of it.
@@ -109,7 +112,7 @@ struct Seen<'s> {
     most: u32,
 }
 
-impl Glints<'_, '_> {
+impl Glints<'_, '_, '_> {
     /// Adds what the facets of a row show.
     pub fn row(&mut self, row: usize, sums: &mut Sums) {
         let scene = self.solved.scene;
@@ -121,8 +124,25 @@ impl Glints<'_, '_> {
             let cosine = -scene.side_normal(facet, 0).dot(self.forward);
             let side = usize::from(cosine < 0.0);
             if cosine != 0.0 && side < scene.sides() {
-                self.facet(facet, side, scene.area(facet) * cosine.abs(), sums);
+                let area = scene.area(facet) * cosine.abs();
+                match self.importance {
+                    None => self.facet(facet, side, area, sums),
+                    Some(_) => self.noted(facet, side, area, sums),
+                }
             }
+        }
+    }
+
+    /// [`Glints::facet`], and notes what it adds.
+    // apart: it does not burden the stack of all else
+    #[inline(never)]
+    fn noted(&mut self, facet: usize, side: usize, area: f64, sums: &mut Sums) {
+        let before = sums.intensity;
+        self.facet(facet, side, area, sums);
+        if let Some(importance) = self.importance.as_deref_mut() {
+            let mut shown = sums.intensity;
+            shown.iter_mut().zip(before).for_each(|(shown, before)| *shown -= before);
+            importance.add_glints(facet, &shown);
         }
     }
 
