@@ -23,23 +23,28 @@ RULES = [
     (r"^blik::run::Runner::each$", r"^blik::run::lane$"),
     (
         r"^blik::run::Job::lane$",
-        r"^blik::(run::Runner::(rows|ranges)|plane::Lanes::rows|coupling::Filler::round|view::(follow|paint)|"
-        r"solution::Shine::beams)::\{\{closure\}\}$",
+        r"^(<blik::run::Runner as blik_kernel::stages::Executor>::pieces|"
+        r"blik::(plane::Lanes::rows|plane::solution::fill_direct|lights::solve_all|view::(follow|paint)))::\{\{closure\}\}$",
     ),
     (r"^blik::plane::Lanes::rows::", r"^blik::plane::(coupling::build|solution::build|view::trace)::\{\{closure\}\}$"),
     (r"^blik::plane::view::trace::", r"^blik::plane::view::blik_plane_(image|radiance)::"),
     # a mesh and a tracer of the caller's
     (r"^blik_kernel::scene::", r"^<blik::mesh::Reader as blik_kernel::scene::input::Mesh>::"),
-    (r"^blik_kernel::bvh::external::", r"^<blik::intersector::Caller as blik_kernel::bvh::external::Intersector>::"),
+    (
+        r"^blik_kernel::rays::bvh::external::",
+        r"^<blik::intersector::Caller as blik_kernel::rays::bvh::external::Intersector>::",
+    ),
     (r"^<?blik::intersector::Caller\b", ""),
+    # a function of progress
+    (r"^blik::explain::blik_explain::", ""),
     # rays of a series, and who traces them
     (
-        r"^blik_kernel::bvh::external::Ahead::answer$",
-        r"^blik_kernel::(bvh::external::<impl blik_kernel::bvh::Bvh>::(closest|occluded)_of|image::Painter::(first_hit|"
-        r"scatter)|signature::Tracer::sample|subdivide::Probe::shoot)::\{\{closure\}\}$|^blik::scene::blik_any_hits::",
+        r"^blik_kernel::rays::bvh::external::\w+::answer$",
+        r"^blik_kernel::(rays::bvh::external::<impl blik_kernel::rays::bvh::Bvh>::(closest|occluded)_of|"
+        r"view::image::Painter::(first_hit|scatter)|view::signature::Tracer::sample|coupling::subdivide::Probe::shoot)::\{\{closure\}\}$|^blik::scene::blik_any_hits::",
     ),
     # an image's rows are integrals of integrals
-    (r"^blik_kernel::image::lines::(integrate|put)$", r"^blik_kernel::image::Painter::lines_across::"),
+    (r"^blik_kernel::view::image::line_integral::(integrate|put)$", r"^blik_kernel::view::image::Painter::lines_across::"),
     # skies of the plane model, the caller's among them
     (r"^<?blik_kernel::plane::", r"^blik::plane::solution::(asking|DARK)\b"),
     (r"^blik::plane::solution::asking::", ""),
