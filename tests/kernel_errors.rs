@@ -310,13 +310,13 @@ fn memory_of_the_wrong_size() {
     let error = Bvh::build_obvhs(scene.corners(), scene.areas(), isa, &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
-    let needed = SubdivisionTree::bytes(2, 1e-2).unwrap();
+    let needed = SubdivisionTree::bytes(2, 1e-2, 0).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
-    let error = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut small).unwrap_err();
+    let error = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), 0, &mut small).unwrap_err();
     is(error, Error::BufferTooSmall { needed, given: needed - 1 }, &["too small"]);
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     let mut trees = vec![0; needed];
-    let cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
+    let cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), 0, &mut trees).unwrap();
     let needed = Elements::bytes(&cut).unwrap();
     let mut small = vec![UNTOUCHED; needed - 1];
     let error = Elements::new(&scene, &cut, &mut small).unwrap_err();
@@ -324,7 +324,7 @@ fn memory_of_the_wrong_size() {
     assert!(small.iter().all(|&b| b == UNTOUCHED));
     assert!(matches!(Block::open(&[]).unwrap_err(), Error::BufferTooSmall { given: 0, .. }));
     // as many elements as an index holds, the finest subdivision of these facets goes beyond
-    let error = SubdivisionTree::bytes(1 << 29, 1e-6).unwrap_err();
+    let error = SubdivisionTree::bytes(1 << 29, 1e-6, 0).unwrap_err();
     is(error, Error::TooMany { what: "elements", limit: 1 << 29 }, &["too many elements", "536870912"]);
     // more pieces of a polygon than there is room for
     let triangle = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]].map(Vec3::from_array);
@@ -392,8 +392,9 @@ fn outputs_of_the_wrong_size() {
         assert!(sums.iter().all(|s| s.area == 7.0));
 
         let mut values = [7.0; 5];
-        let mut trees = vec![0; SubdivisionTree::bytes(solved.scene.facets(), 1e-3).unwrap()];
-        let mut cut = SubdivisionTree::new(solved.scene, &ErrorBudget::new(1e-3, 1e-3), &mut trees).unwrap();
+        let mut trees = vec![0; SubdivisionTree::bytes(solved.scene.facets(), 1e-3, 0).unwrap()];
+        let mut cut =
+            SubdivisionTree::new(solved.scene, &ErrorBudget::new(1e-3, 1e-3), 0, &mut trees).unwrap();
         let (work, _) = cut.newest_level();
         let error = work
             .probe(

@@ -158,11 +158,11 @@ fn scene_tree_and_elements_refuse_one_byte_less() {
         let bvh = Bvh::build(corners, areas, Isa::BASELINE, &mut memory).unwrap();
         let bytes = PlaneSides::bytes(&scene, true).unwrap();
         short("planes", bytes, |memory| PlaneSides::new(&scene, &bvh, true, memory).err());
-        short("trees", SubdivisionTree::bytes(facets, 1e-2).unwrap(), |memory| {
-            SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), memory).err()
+        short("trees", SubdivisionTree::bytes(facets, 1e-2, 0).unwrap(), |memory| {
+            SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), 0, memory).err()
         });
-        let mut trees = vec![0; SubdivisionTree::bytes(facets, 1e-2).unwrap()];
-        let mut cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), &mut trees).unwrap();
+        let mut trees = vec![0; SubdivisionTree::bytes(facets, 1e-2, 0).unwrap()];
+        let mut cut = SubdivisionTree::new(&scene, &ErrorBudget::new(1e-2, 1e-2), 0, &mut trees).unwrap();
         let (work, _) = cut.newest_level();
         wrong("unevenness", facets, f64::MAX, |out| {
             work.probe(&scene, &bvh, &PlaneSides::NONE, (16, &ErrorBudget::new(1e-2, 1e-2)), 0..facets, out)

@@ -192,13 +192,29 @@ impl Cutter {
 }
 
 /// Bytes that elements and their making need at most.
-fn element_bytes(base: &blik_scene, tolerance: f64) -> Result<usize, blik_error> {
+fn element_bytes(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     let facets = base.scene.facets();
-    let most = subdivide::most_elements(facets, tolerance);
-    // first element of each facet, all nodes, facet and path of each element; the trees while they grow
-    let kept =
-        facets.saturating_mul(4).saturating_add(most.saturating_mul(4 + 4 + 6)).saturating_add(8 * ALIGNMENT);
-    Ok(SubdivisionTree::bytes(facets, tolerance)?.saturating_add(kept))
+    let most = subdivide::most_elements(facets, settings.asked.budget.solution);
+    // facets of clusters and their sums of areas, all nodes, facet and path of each element; the trees while they grow
+    let kept = facets
+        .saturating_mul(8)
+        .saturating_add(most.saturating_mul(4 + 4 + 6))
+        .saturating_add(12 * ALIGNMENT);
+    Ok(tree_bytes(base, settings)?.saturating_add(kept))
+}
+
+/// Bytes of the trees while they grow.
+fn tree_bytes(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
+    let (asked, scene) = (&settings.asked, &base.scene);
+    Ok(SubdivisionTree::bytes(scene.facets(), asked.budget.solution, asked.clusters(scene))?)
+}
+
+/// About the most elements that a scene may have.
+fn most_elements(base: &blik_scene, settings: &Settings) -> usize {
+    let (facets, clusters) = (base.scene.facets(), settings.asked.clusters(&base.scene));
+    // large facets stand alone beside the clusters: fewer than these
+    let roots = if clusters > 0 { facets.min(2 * clusters) } else { facets };
+    subdivide::most_elements(roots, settings.asked.budget.solution)
 }
 
 /// How finely each facet is cut.
@@ -209,7 +225,12 @@ fn cut<'s>(
     runner: &mut Runner,
     scratch: &'s mut [u8],
 ) -> Result<SubdivisionTree<'s>, blik_error> {
-    let mut cut = SubdivisionTree::new(&base.scene, &settings.asked.budget, scratch)?;
+    let mut cut = SubdivisionTree::new(
+        &base.scene,
+        &settings.asked.budget,
+        settings.asked.clusters(&base.scene),
+        scratch,
+    )?;
     stages::refine(&base.scene, &base.bvh, plane_sides, &settings.asked, &mut cut, runner)?;
     Ok(cut)
 }
@@ -223,7 +244,7 @@ fn elements(
     cutter: &mut Cutter,
 ) -> Result<Elements<'static>, blik_error> {
     // the trees stand at the end of the memory while the elements are made at its front
-    let scratch_bytes = SubdivisionTree::bytes(base.scene.facets(), settings.asked.budget.solution)?;
+    let scratch_bytes = tree_bytes(base, settings)?;
     let whole = cutter.lend();
     let keep = whole.len().saturating_sub(scratch_bytes);
     let short = blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL);
@@ -243,13 +264,11 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
     while let Some(fewer) = rows.fewer().filter(|_| settings.fit) {
         rows = fewer;
     }
-    let unknowns =
-        subdivide::most_elements(base.scene.facets(), settings.asked.budget.solution) * base.scene.sides();
+    let unknowns = most_elements(base, settings) * base.scene.sides();
     let row = stages::least_bytes(&base.scene, &rows, unknowns)?;
     let table = stages::places(unknowns) * (size_of::<BlockPlace>() + size_of::<Block<'_>>()) + 4 * ALIGNMENT;
     let planes = PlaneSides::bytes(&base.scene, settings.planes(base))? + ALIGNMENT;
-    let parts =
-        [head::<blik_coupling>(), element_bytes(base, settings.asked.budget.solution)?, table, row, planes];
+    let parts = [head::<blik_coupling>(), element_bytes(base, settings)?, table, row, planes];
     Ok(parts.iter().fold(0usize, |sum, part| sum.saturating_add(*part)))
 }
 
@@ -483,8 +502,7 @@ mod owned {
         // SAFETY: dropped at the end of this function, after the last use.
         let plane_sides =
             PlaneSides::new(&base.scene, &base.bvh, settings.planes(base), unsafe { planes.bytes_mut() })?;
-        let mut scratch =
-            Slab::new(SubdivisionTree::bytes(base.scene.facets(), settings.asked.budget.solution)?)?;
+        let mut scratch = Slab::new(tree_bytes(base, settings)?)?;
         // SAFETY: dropped at the end of this function, after the last use.
         let cut = cut(base, &plane_sides, settings, runner, unsafe { scratch.bytes_mut() })?;
         let mut own = Slab::new(Elements::bytes(&cut)?)?;

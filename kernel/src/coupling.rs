@@ -6,6 +6,7 @@
 
 mod bake;
 pub mod bundle;
+pub mod cluster;
 pub(crate) mod detail;
 pub mod element;
 mod exact;

@@ -254,8 +254,10 @@ impl Host {
         let wanted = settings::planes(&scene, &rows);
         let mut planes = Memory::new(PlaneSides::bytes(&scene, wanted)?);
         let plane_sides = PlaneSides::new(&scene, &bvh, wanted, planes.bytes_mut())?;
-        let mut trees = Memory::new(SubdivisionTree::bytes(scene.facets(), settings.budget.solution)?);
-        let mut cut = SubdivisionTree::new(&scene, &settings.budget, trees.bytes_mut())?;
+        let clusters = settings.clusters(&scene);
+        let mut trees =
+            Memory::new(SubdivisionTree::bytes(scene.facets(), settings.budget.solution, clusters)?);
+        let mut cut = SubdivisionTree::new(&scene, &settings.budget, clusters, trees.bytes_mut())?;
         let mut run = Run::new(self);
         report.rays.visibility += stages::refine(&scene, &bvh, &plane_sides, &settings, &mut cut, &mut run)?;
         *element_memory = Memory::new(Elements::bytes(&cut)?);

@@ -6,13 +6,14 @@
 use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
 use crate::base::math::{clamp, pow};
+use crate::coupling::cluster;
 use crate::coupling::mirror_path::MIRRORS_MOST;
 use crate::coupling::rows::RowSettings;
 use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::TableShape;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
-use crate::view::chain::{ChainSettings, PixelArea};
+use crate::view::chain::{ChainSettings, GATHERS, PixelArea, finds_thrown_sun};
 
 /// What a caller asks of the stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +51,14 @@ impl Settings {
     /// How the rows of a scene's coupling are computed.
     pub fn rows(&self, scene: &Scene<'_>) -> RowSettings {
         RowSettings::new(scene, &self.budget, self.max_bounces, self.directional, self.all_irradiances)
+    }
+
+    /// Clusters of facets that a scene's elements are to be ([`cluster`]); 0: each facet stays alone. So it is where the
+    /// irradiance of each is wanted, and where points find no light for themselves: what curved mirrors and narrow lobes throw
+    /// of the sun stays a mean over elements.
+    pub fn clusters(&self, scene: &Scene<'_>) -> usize {
+        let apart = self.all_irradiances || !GATHERS || !finds_thrown_sun(scene);
+        if apart { 0 } else { cluster::wanted(scene.facets(), self.budget.solution) }
     }
 
     /// As [`Settings::rows`], for `count` rows within the budget of rays.

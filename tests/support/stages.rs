@@ -109,7 +109,7 @@ impl Workspace {
             // what a table of planes takes at most
             planes: vec![0xa5; 10 << 20],
             // trees of quarters, at the tightest tolerance of these tests
-            trees: vec![0xa5; SubdivisionTree::bytes(facets, 5e-4).unwrap()],
+            trees: vec![0xa5; SubdivisionTree::bytes(facets, 5e-4, 0).unwrap()],
             // solutions of small rooms: sixteen values of each unknown and band, and those of the images of the sun
             tables: Tables {
                 kept: vec![0xa5; 64 * (8 * bands * unknowns + 2 * facets) + 65536],
@@ -221,7 +221,7 @@ pub fn run(
     let directional = !sky.is_some_and(|sky| matches!(sky.model, SkyModel::Uniform));
     let plane_sides = PlaneSides::new(&scene, &bvh, !directional, &mut work.planes)?;
     let asked = settings::Settings { directional, ..settings::Settings::new(plan.tolerance, None)? };
-    let mut cut = SubdivisionTree::new(&scene, &asked.budget, &mut work.trees)?;
+    let mut cut = SubdivisionTree::new(&scene, &asked.budget, asked.clusters(&scene), &mut work.trees)?;
     let mut run = Backward { parts };
     counts.visibility += stages::refine(&scene, &bvh, &plane_sides, &asked, &mut cut, &mut run)?;
     let bytes = Elements::bytes(&cut)?;

@@ -91,6 +91,10 @@ fn departures(open: [bool; ELEMENT_PARTS]) -> [f64; ELEMENT_PARTS] {
     })
 }
 
+/// By what each part of a cluster counts in how far light departs from its mean: half the difference between two pairs, whose
+/// square is expected to be that of one.
+const CLUSTER_DEPARTURES: [f64; ELEMENT_PARTS] = [0.5, -0.5, 0.5, -0.5];
+
 /// Most entries in closed form of one row.
 const ROW_CLOSED_FORMS_MOST: usize = 4096;
 
@@ -193,7 +197,7 @@ pub fn fill(
     };
     let proven = if words > 0 { Arena::new(behind, room)?.take::<u64>(words)? } else { &mut [] };
     let wanted = range.len();
-    let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / scene.facets() as f64;
+    let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / elements.roots() as f64;
     let mut tracer = Tracer { scene, bvh, elements, plane_sides, settings, mean_area, builder, proven };
     for unknown in range {
         if tracer.row(unknown).is_none() {
@@ -224,6 +228,8 @@ struct Start {
     element: usize,
     facet: usize,
     side: usize,
+    /// Whether the element is a cluster, whose facets have normals of their own.
+    cluster: bool,
     frame: (Vec3, Vec3),
     sequences: [Sequence; ELEMENT_PARTS],
 }
@@ -311,7 +317,8 @@ impl Tracer<'_, '_> {
             return Some(());
         }
         let normal = self.scene.side_normal(facet, side);
-        if opens_to_sky(self.scene, self.bvh, facet, normal) {
+        let cluster = self.elements.is_cluster(unknown);
+        if !cluster && opens_to_sky(self.scene, self.bvh, facet, normal) {
             self.builder.end_row(
                 Row { state: OPEN, visible_share: 1.0, ..Row::default() },
                 Some,
@@ -323,10 +330,11 @@ impl Tracer<'_, '_> {
             element: unknown / self.scene.sides().max(1),
             facet,
             side,
+            cluster,
             frame: frame(normal),
             sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
         };
-        let most = self.most_rays(self.scene.areas().at(facet) * self.elements.share(unknown));
+        let most = self.most_rays(self.elements.area(self.scene, unknown));
         let mut tally = Tally::default();
         let proven = core::mem::take(&mut self.proven);
         let closed = self.closed(&start, normal, most, proven, &mut tally);
@@ -334,7 +342,7 @@ impl Tracer<'_, '_> {
         if !closed? {
             self.sampled(&start, most, &mut tally)?;
         }
-        self.end_row(&tally);
+        self.end_row(&tally, cluster);
         Some(())
     }
 
@@ -471,7 +479,7 @@ impl Tracer<'_, '_> {
 
     /// Turns what the parts saw into the row.
     #[inline(never)]
-    fn end_row(&mut self, tally: &Tally) {
+    fn end_row(&mut self, tally: &Tally, cluster: bool) {
         let (exposed, hidden) = tally.exposed();
         let closed = tally.known.share() > 0.0;
         let rays_of =
@@ -484,7 +492,8 @@ impl Tracer<'_, '_> {
         let enclosed = self.settings.directional
             && !hidden
             && !closed
-            && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
+            // a cluster's facets see another sky each: what is open has all of it
+            && (cluster || 2 * (tally.blocked + seen).saturating_sub(counted) > seen);
         let dropped = if enclosed { BLOCKED } else { STRAIGHT };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },
@@ -498,8 +507,15 @@ impl Tracer<'_, '_> {
             truncated_weight: tally.truncated_weight * share,
             ..Row::default()
         };
-        let (slopes, departures) =
-            (slopes(counts.map(|count| count > 0)), departures(counts.map(|count| count > 0)));
+        let open = counts.map(|count| count > 0);
+        let (slopes, departures) = if cluster {
+            (
+                [[0.0; 2]; ELEMENT_PARTS],
+                if open == [true; ELEMENT_PARTS] { CLUSTER_DEPARTURES } else { departures(open) },
+            )
+        } else {
+            (slopes(open), departures(open))
+        };
         let first_half = (tally.rays / (2 * ELEMENT_PARTS as u32)) as f32;
         let mean = 1.0 / f64::from(seen.max(1));
         let kinds = [0, 1, 2, 3].map(|part| tally.kinds(part));
@@ -572,9 +588,10 @@ impl Tracer<'_, '_> {
         let (a, b) = quarter::out_of(part, (a, b));
         let (p, q) = sequence.pair(index, 0);
         let (dx, dy, dz) = cosine_direction(p, q);
-        let (u, v) = self.elements.in_facet(start.element, a, b);
-        let origin = Surface::new(self.scene, start.facet, start.side, u, v);
-        (origin.spawn_ray(start.frame.0 * dx + start.frame.1 * dy + origin.normal * dz), bin)
+        let (facet, u, v) = self.elements.place(start.element, a, b);
+        let origin = Surface::new(self.scene, facet, start.side, u, v);
+        let axes = if start.cluster { frame(origin.normal) } else { start.frame };
+        (origin.spawn_ray(axes.0 * dx + axes.1 * dy + origin.normal * dz), bin)
     }
 
     /// Adds what ray number `tally.rays` of a row finds: its first hit, which is given, and its mirror chain. `None` where
@@ -616,7 +633,7 @@ impl Tracer<'_, '_> {
         let (bin, part) = (mark[0] as usize % ROW_BINS, tally.rays as usize % ELEMENT_PARTS);
         let surface = Surface::of_hit(self.scene, hit);
         tally.backs[bin] += u32::from(surface.is_none());
-        if tally.apart[bin] && inside(self.bvh, ray, self.scene.side_normal(start.facet, start.side)) {
+        if tally.apart[bin] && inside(self.bvh, ray, self.scene.side_normal(ray.skip as usize, start.side)) {
             tally.inside[bin] += 1;
             return Some(None);
         }

@@ -6,7 +6,7 @@
 //! unevenness, [`SubdivisionTree::refine`] quarters those whose error counts most. Triangles far larger than objects
 //! close before them are quartered first: their probed points are too far from each other to show such objects.
 
-use crate::base::arena::{Arena, Need, plain_struct};
+use crate::base::arena::{Arena, plain_struct};
 use crate::base::budget::ErrorBudget;
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, span};
@@ -14,6 +14,7 @@ use crate::base::math::{Vec3, frame, sqrt};
 use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::base::quarter::{Path, QUARTERS, out_of};
 use crate::base::simd::Isa;
+use crate::coupling::cluster::Clusters;
 use crate::coupling::detail::DetailSearch;
 use crate::coupling::plane_sides::{PlaneSides, ProvenVisible, Receiver, SIDE_SET_WORDS};
 use crate::form_factor::{TRIANGLE_LANES, TriangleBlock, point_to_triangle, point_to_triangles};
@@ -76,8 +77,10 @@ plain_struct! {
         pub facet: u32,
         /// Which part of it: a [`Path`].
         pub path: u32,
-        /// The first of its four quarters; 0: it is an element.
+        /// The first of its four quarters; 0: it is an element, or part of one.
         pub child: u32,
+        /// 1 and the number of its cluster; 0: none.
+        pub cluster: u32,
     }
 }
 
@@ -86,9 +89,12 @@ plain_struct! {
 pub struct SubdivisionTree<'m> {
     nodes: &'m mut [Node],
     unevenness: &'m mut [f64],
+    clusters: Clusters<'m>,
     used: usize,
     fresh: usize,
     facets: usize,
+    /// Elements before any was quartered: facets alone, and clusters.
+    roots: usize,
     /// Area that counts as the object's ([`counted_area`]).
     area: f64,
     /// Mean square error, over the object's area, of the triangles that stay as they are.
@@ -101,6 +107,7 @@ pub struct SubdivisionTree<'m> {
 #[derive(Clone, Copy, Debug)]
 pub struct Level<'a> {
     nodes: &'a [Node],
+    roots: usize,
     area: f64,
 }
 
@@ -154,25 +161,29 @@ fn most_nodes(facets: usize, tolerance: f64) -> usize {
 }
 
 impl<'m> SubdivisionTree<'m> {
-    /// Bytes for the trees of `facets` facets.
-    pub fn bytes(facets: usize, tolerance: f64) -> Result<usize, Error> {
+    /// Bytes for the trees of `facets` facets, of which so many `clusters` are wanted.
+    pub fn bytes(facets: usize, tolerance: f64, clusters: usize) -> Result<usize, Error> {
         let nodes = most_nodes(facets, tolerance);
         // two sides and the flag bit of a coupling's record must fit into 32 bits
         let limit = 1usize << 29;
         if nodes > limit {
             return Err(Error::TooMany { what: "elements", limit });
         }
-        Need::new().and::<Node>(nodes).and::<f64>(nodes).bytes()
+        Clusters::need(facets, clusters).and::<Node>(nodes).and::<f64>(nodes).bytes()
     }
 
-    /// Every facet whole, and to be probed.
+    /// Every facet whole, and to be probed where it is not in one of about so many `clusters`.
     pub fn new(
         scene: &Scene<'_>,
         budget: &ErrorBudget,
+        clusters: usize,
         memory: &'m mut [u8],
     ) -> Result<SubdivisionTree<'m>, Error> {
         let facets = scene.facets();
-        let mut arena = Arena::new(memory, SubdivisionTree::bytes(facets, budget.solution)?)?;
+        let mut arena = Arena::new(memory, SubdivisionTree::bytes(facets, budget.solution, clusters)?)?;
+        let area = counted_area(scene.areas());
+        let clusters = Clusters::new(scene, clusters, area, &mut arena)?;
+        let roots = facets - clusters.facets() + clusters.count();
         let capacity = most_nodes(facets, budget.solution);
         let nodes = arena.take::<Node>(capacity)?;
         let unevenness = arena.take::<f64>(capacity)?;
@@ -181,23 +192,35 @@ impl<'m> SubdivisionTree<'m> {
             *node = Node { facet: facet as u32, ..Node::default() };
             *expected = 0.0;
         }
+        for (number, facets) in clusters.iter().enumerate() {
+            for facet in facets {
+                if let Some(node) = nodes.get_mut(*facet as usize) {
+                    node.cluster = number as u32 + 1;
+                }
+            }
+        }
         Ok(SubdivisionTree {
             nodes,
             unevenness,
+            clusters,
             used: facets,
             fresh: 0,
             facets,
-            area: counted_area(scene.areas()),
+            roots,
+            area,
             settled: 0.0,
             goal: budget.elements,
-            most: most_elements(facets, budget.solution),
+            most: most_elements(roots, budget.solution),
         })
     }
 
     /// The triangles to be probed, and where their unevenness is to stand: what is expected of each, to begin with.
     pub fn newest_level(&mut self) -> (Level<'_>, &mut [f64]) {
         let range = self.fresh..self.used;
-        (Level { nodes: self.nodes.part(range.clone()), area: self.area }, self.unevenness.part_mut(range))
+        (
+            Level { nodes: self.nodes.part(range.clone()), roots: self.roots, area: self.area },
+            self.unevenness.part_mut(range),
+        )
     }
 
     /// Quarters those of the probed triangles whose errors count most, and says whether there are new ones.
@@ -219,7 +242,7 @@ impl<'m> SubdivisionTree<'m> {
             *value = if uneven == DETAILED { DETAILED } else { weight(node) * uneven };
         }
         let values = self.unevenness.part(range.clone());
-        let elements = self.facets + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
+        let elements = self.roots + (self.used - self.facets) / QUARTERS * (QUARTERS - 1);
         let cuts = (self.most.saturating_sub(elements) * 3 / (4 * (QUARTERS - 1)))
             .min(self.nodes.len().saturating_sub(self.used) / QUARTERS);
         let nodes = self.nodes.part(range.clone());
@@ -235,7 +258,7 @@ impl<'m> SubdivisionTree<'m> {
             let detailed = value == DETAILED;
             let stays = if detailed { area(&node) < largest } else { value < threshold };
             let value = if detailed { 0.0 } else { value };
-            if stays || path.depth() >= Path::DEEPEST {
+            if stays || node.cluster != 0 || path.depth() >= Path::DEEPEST {
                 self.settled += value;
                 continue;
             }
@@ -259,6 +282,11 @@ impl<'m> SubdivisionTree<'m> {
     /// Facets.
     pub fn facets(&self) -> usize {
         self.facets
+    }
+
+    /// The clusters of facets that are elements together.
+    pub fn clusters(&self) -> Clusters<'m> {
+        self.clusters
     }
 }
 
@@ -309,13 +337,13 @@ impl Level<'_> {
             return Err(Error::Length { what: "unevenness", expected: span(&range), given: out.len() });
         }
         let rays = rays.clamp(PROBE_RAYS_FEWEST, PROBE_RAYS_MOST);
-        let many = most_elements(scene.facets(), budget.solution) as f64;
+        let many = most_elements(self.roots, budget.solution) as f64;
         let mut probe = Probe { scene, bvh, plane_sides, rays, negligible: 0.0, traced: 0 };
         for (node, value) in self.nodes.part(range).iter().zip(out) {
             let expected = core::mem::take(value);
             let facet = node.facet as usize;
             let rho = scene.largest_diffuse_of(facet);
-            if scene.areas().at(facet) == 0.0 || rho == 0.0 {
+            if scene.areas().at(facet) == 0.0 || rho == 0.0 || node.cluster != 0 {
                 continue;
             }
             let share = Path(node.path).share() * scene.areas().at(facet) / self.area;

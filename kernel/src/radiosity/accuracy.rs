@@ -88,8 +88,9 @@ impl LaneTask for Differences<'_, '_> {
         let bands = system.shape.bands.clamp(1, MAX_BANDS);
         // one by one: a pair of them would be made elsewhere on the stack and copied
         let mut half_differences = [[0.0; 4]; MAX_BANDS];
-        let mut light = [0.0; MAX_BANDS];
+        let (mut light, mut means) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
         let (sums, light) = (half_differences.head_mut(bands), light.head_mut(bands));
+        let means = means.head_mut(bands);
         for ((unknown, row), out) in system.coupling.rows(range).zip(pieces(out, bands)) {
             sums.fill([0.0; 4]);
             add_targets(&row, radiance, sums);
@@ -97,17 +98,33 @@ impl LaneTask for Differences<'_, '_> {
             if let Some(sky) = &system.light.sky {
                 add_sky(&row, (sky, known), lanes, light, sums);
             }
+            // a cluster's mean has what its rays leave of the straight sky, too
+            let cluster = known && system.elements.is_cluster(unknown);
+            means.fill(0.0);
+            if let Some(sky) = system.light.sky.as_ref().filter(|_| cluster) {
+                means.iter_mut().zip(&*sums).for_each(|(mean, [first, second, ..])| *mean = first + second);
+                add_straight(&row, sky, lanes, light, means);
+            }
             if known {
                 about_mean(system, unknown, &row, radiance, lanes, light, sums);
             }
-            for ((out, sums), reference) in out.iter_mut().zip(&*sums).zip(reference) {
+            let function = if system.elements.is_cluster(unknown) { 1.0 } else { LINEAR_VARIANCE };
+            for (((out, sums), mean), reference) in out.iter_mut().zip(&*sums).zip(&*means).zip(reference) {
                 let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
-                let [first, second, one, other] = sums.map(|s| scale * s);
-                let noise = LINEAR_VARIANCE * (first * first + second * second);
-                *out = [narrow(first + second), narrow(noise + DEPARTURE_FACTOR * (one * other).max(0.0))];
+                let sums = sums.map(|s| scale * s);
+                let mean = if cluster { scale * mean } else { sums[0] + sums[1] };
+                *out = [narrow(mean), narrow(square(sums, function))];
             }
         }
     }
+}
+
+/// Expected squared error at points of an element, by the differences of its rays' halves and quarters: `function` is the
+/// variance of what stands for the light on it over that of its mean.
+#[inline(always)]
+pub(super) fn square([first, second, one, other]: [f64; 4], function: f64) -> f64 {
+    let noise = function * (first * first + second * second);
+    noise + DEPARTURE_FACTOR * (one * other).max(0.0)
 }
 
 /// How wrong the radiances of the rows of `range` are by their differences and by what others' errors (`from`, as this
@@ -222,7 +239,7 @@ fn about_mean<L: Lanes>(
 
 /// Adds a row's checks, each times the light it stands for, by band.
 #[inline(always)]
-fn add(sums: &mut [[f64; 4]], half_differences: [f32; 4], lights: impl Iterator<Item = f64>) {
+pub(super) fn add(sums: &mut [[f64; 4]], half_differences: [f32; 4], lights: impl Iterator<Item = f64>) {
     for (sum, light) in sums.iter_mut().zip(lights) {
         sum.iter_mut().zip(half_differences).for_each(|(s, c)| *s += light * f64::from(c));
     }
@@ -235,6 +252,17 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
         let start = record.unknown() * bands;
         let seen = radiance.part(start..start + bands);
         add(sums, record.half_differences, seen.iter().zip(row.products(record.path())).map(|(l, p)| l * p));
+    }
+}
+
+/// Adds half the difference between the halves of a row's rays of what they see of the sky straight.
+#[inline(always)]
+fn add_straight<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [f64]) {
+    for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
+        sky.sum(lanes, bundle.packed, light);
+        let sign = if bundle.path == BLOCKED && row.row.state != ENCLOSED { -1.0 } else { 1.0 };
+        let [first, second, ..] = bundle.half_differences.map(f64::from);
+        sums.iter_mut().zip(&*light).for_each(|(sum, l)| *sum += sign * (first + second) * l);
     }
 }
 

@@ -270,8 +270,8 @@ impl Tracer<'_, '_> {
     /// Notes what a chain brings to the surface that it has met.
     fn arrive(&mut self, chain: &Chain) -> Option<()> {
         let Surface { facet, side, u, v, .. } = chain.surface;
-        let target = self.elements.locate(facet, side, u, v);
-        let area = self.scene.areas().at(facet) * self.elements.share(target.0);
+        let target = self.elements.locate_within(facet, side, u, v);
+        let area = self.elements.area(self.scene, target.0);
         let image = chain.axis.map_or(0, |axis| pack(-axis));
         let from = (image, if image == 0 { 0 } else { chain.mirror as u32 });
         self.builder.push(Record::beam(target, chain.path, chain.flux / area, from))

@@ -209,22 +209,35 @@ pub fn sun_rows(
     let mut rays = 0;
     for ((unknown, row), value) in coupling.rows(range).zip(out) {
         let (facet, side) = elements.facet_of(unknown);
+        let cluster = elements.is_cluster(unknown);
         let cosine = sun.cosine(scene.side_normal(facet, side));
         *value = 0.0;
-        if row.row.state == ABSENT || cosine <= 0.0 {
+        if row.row.state == ABSENT || (cosine <= 0.0 && !cluster) {
             continue;
         }
         if row.row.state == OPEN {
             *value = cosine;
             continue;
         }
-        let (share, count) = probe.lit_share(unknown);
-        rays += u64::from(count);
+        let lit = probe.lit(unknown);
+        rays += u64::from(lit.count);
+        // each of a cluster's facets has its own cosine
+        let cosine = if cluster { lit.cosine } else { cosine };
         let visible_share = f64::from(row.row.visible_share);
         // inside a body: what falls there matters to nothing
-        *value = if visible_share > 0.0 { cosine * (share / visible_share).min(1.0) } else { 0.0 };
+        *value = if visible_share > 0.0 { cosine * (lit.share / visible_share).min(1.0) } else { 0.0 };
     }
     Ok(rays)
+}
+
+/// What an element sees of the sun.
+struct Lit {
+    /// Share of the sun's light that nothing hides, the mean over its points.
+    share: f64,
+    /// Mean of max(0, cos) of the sun over its points.
+    cosine: f64,
+    /// Points.
+    count: u32,
 }
 
 /// Tests which share of the sun elements see, with room for the rays that are traced together.
@@ -240,8 +253,8 @@ struct SunProbe<'a> {
 }
 
 impl SunProbe<'_> {
-    /// Share of the sun's light on an unknown that nothing hides, the mean over its points; and the points.
-    fn lit_share(&mut self, unknown: usize) -> (f64, u32) {
+    /// How much of the sun an unknown sees, by its points.
+    fn lit(&mut self, unknown: usize) -> Lit {
         let sequence = Sequence::new(hash2(unknown as u32, 0x0500_0000));
         let (mut lit, mut all, mut count, mut goal) = (0.0, 0.0, 0, SUN_POINTS_LEAST);
         while count < goal {
@@ -257,22 +270,23 @@ impl SunProbe<'_> {
                 goal = SUN_POINTS_MOST;
             }
         }
-        (if all > 0.0 { lit / all } else { 0.0 }, count)
+        let share = if all > 0.0 { lit / all } else { 0.0 };
+        Lit { share, cosine: all / f64::from(count.max(1)), count }
     }
 
     /// Rays from points of an unknown toward the sun, those of `numbers` that leave it; returns how many.
     fn aim(&mut self, unknown: usize, sequence: &Sequence, numbers: Range<u32>) -> usize {
         let SunProbe { scene, elements, sun, toward, shares, .. } = self;
-        let (facet, side) = elements.facet_of(unknown);
-        let normal = scene.side_normal(facet, side);
+        let (_, side) = elements.facet_of(unknown);
         let mut kept = 0;
         for n in numbers {
             let (p, q) = sequence.pair(n, 0);
             let (a, b) = triangle(p, q);
-            let (u, v) = elements.in_facet(unknown / scene.sides().max(1), a, b);
+            let (facet, u, v) = elements.place(unknown / scene.sides().max(1), a, b);
             let (s, t) = sequence.pair(n, 2);
-            let ray = Surface::new(scene, facet, side, u, v).spawn_ray(sun.sample(s, t));
-            let share = sun.share(ray.direction, normal);
+            let from = Surface::new(scene, facet, side, u, v);
+            let ray = from.spawn_ray(sun.sample(s, t));
+            let share = sun.share(ray.direction, from.normal);
             if share > 0.0 {
                 toward.set(kept, ray);
                 shares.set(kept, share);

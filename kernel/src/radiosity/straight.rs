@@ -7,9 +7,11 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
 use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
 use crate::base::quarter::{self, QUARTERS};
+use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
 use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, Row, RowView, TRACED};
+use crate::radiosity::accuracy;
 use crate::rays::bvh::Bvh;
 use crate::rays::outline::{Basis, Candidates, OpenSky};
 use crate::scene::sky::Sky;
@@ -207,6 +209,10 @@ fn row(
     if of.coupling.row(unknown).state == ABSENT {
         return Some(0.0);
     }
+    if of.elements.is_cluster(unknown) {
+        let (_, row) = of.coupling.rows(unknown..unknown + 1).next()?;
+        return simd::run_lanes(Isa::detect(), ClusterSky { of, unknown, row: &row, values });
+    }
     let (facet, side) = of.elements.facet_of(unknown);
     if !candidates.prepare(of.scene, of.bvh, (facet, side)) {
         return None;
@@ -253,6 +259,45 @@ fn row(
     // the mean of stratified points is wrong by an edge that crosses n^1/2 of their n quarters
     let of_mean = departure / pow(fit.points as f64, 1.5);
     (reflects || of_mean <= MOST_MEAN * goal).then_some(departure + fit.error)
+}
+
+/// The straight sky of a cluster, as its row's rays tell it: points of it look for themselves.
+struct ClusterSky<'a, 'o> {
+    of: &'a Looking<'a>,
+    unknown: usize,
+    row: &'a RowView<'a>,
+    values: &'o mut [f64],
+}
+
+impl LaneTask for ClusterSky<'_, '_> {
+    type Out = Option<f64>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Option<f64> {
+        let ClusterSky { of, unknown, row, values } = self;
+        let bands = of.scene.bands().clamp(1, MAX_BANDS);
+        let mut light = [0.0; MAX_BANDS];
+        let mut checks = [[0.0; 4]; MAX_BANDS];
+        let (light, checks) = (light.head_mut(bands), checks.head_mut(bands));
+        let enclosed = row.row.state == ENCLOSED;
+        if !enclosed {
+            let (facet, side) = of.elements.facet_of(unknown);
+            of.sky.irradiance(of.scene.side_normal(facet, side), of.goal, values.head_mut(bands));
+        }
+        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
+            of.sky.sum(lanes, bundle.packed, light);
+            let sign = if bundle.path == BLOCKED && !enclosed { -1.0 } else { 1.0 };
+            light.iter_mut().for_each(|l| *l *= sign);
+            values.iter_mut().zip(&*light).for_each(|(sum, l)| *sum += PI * bundle.weight * l);
+            accuracy::add(checks, bundle.half_differences, light.iter().copied());
+        }
+        values.iter_mut().for_each(|value| *value = value.max(0.0));
+        values.set(3 * bands, row.row.blocked);
+        let relative = checks.iter().zip(of.reference).filter(|(_, reference)| **reference > 0.0);
+        let variance =
+            relative.map(|(checks, reference)| accuracy::square(checks.map(|c| c / reference), 1.0));
+        Some(variance.fold(0.0, f64::max))
+    }
 }
 
 /// Straight sky at the middles of an element's quarters of one depth: sums of what is seen and, last, of the share that is

@@ -16,12 +16,13 @@ mod candidates;
 mod circles;
 mod contour;
 mod edges;
+mod groups;
 
 pub use candidates::Candidates;
+use groups::EdgeGroups;
 
 use crate::base::arena::{Arena, Need, View, Writer, plain_struct};
 use crate::base::error::Error;
-use crate::base::index::IndexMut;
 use crate::base::math::{Vec3, unit};
 use crate::base::simd::WIDTH;
 
@@ -32,9 +33,6 @@ const EDGE_BLOCK_ROWS: usize = 19;
 
 /// Edges, lane by lane.
 type Block = [[f64; WIDTH]; EDGE_BLOCK_ROWS];
-
-/// Centre and radius of a ball about each of some facets, lane by lane.
-type Balls = [[f32; WIDTH]; 4];
 
 /// Set in a facet's group where its body has a rim: both of its sides count, where both carry a material.
 const BOTH: u32 = 1 << 31;
@@ -70,7 +68,8 @@ plain_struct! {
 #[derive(Clone, Copy, Debug)]
 pub struct Outlines<'m> {
     blocks: &'m [Block],
-    balls: &'m [Balls],
+    /// Bounds of [`groups::GROUP`] blocks each.
+    block_groups: &'m [EdgeGroups],
     /// The facet whose plane each facet has, and [`BOTH`].
     groups: &'m [u32],
     edges: usize,
@@ -78,7 +77,7 @@ pub struct Outlines<'m> {
 
 impl<'m> Outlines<'m> {
     /// Without edges: nothing is known.
-    pub const NONE: Outlines<'static> = Outlines { blocks: &[], balls: &[], groups: &[], edges: 0 };
+    pub const NONE: Outlines<'static> = Outlines { blocks: &[], block_groups: &[], groups: &[], edges: 0 };
 
     /// Most edges of a mesh of `facets` facets: a closed one has one and a half for each facet.
     fn most(facets: usize) -> usize {
@@ -95,8 +94,10 @@ impl<'m> Outlines<'m> {
         if most == 0 {
             return need;
         }
-        let need = need.and::<u32>(facets).and::<Balls>(facets.div_ceil(WIDTH));
-        edges::Build::need(need, facets, most).and::<Block>(most.div_ceil(WIDTH))
+        let blocks = most.div_ceil(WIDTH);
+        let need = need.and::<u32>(facets);
+        let need = edges::Build::need(need, facets, most).and::<Block>(blocks);
+        need.and::<EdgeGroups>(groups::count(blocks))
     }
 
     /// Finds the edges of facets of the given corners and areas (0 where they are degenerate). None are found where a
@@ -111,14 +112,14 @@ impl<'m> Outlines<'m> {
             return Ok(Outlines::NONE);
         }
         let groups = arena.take::<u32>(facets)?;
-        let balls = arena.take::<Balls>(facets.div_ceil(WIDTH))?;
         let found = edges::Build::new(corners, areas, most, arena)?.run(groups);
         let Some(found) = found else { return Ok(Outlines::NONE) };
         let edges = found.count();
         let blocks = arena.take::<Block>(edges.div_ceil(WIDTH))?;
+        let block_groups = arena.take::<EdgeGroups>(groups::count(blocks.len()))?;
         found.lay(groups, blocks);
-        enclose(corners, areas, balls);
-        Ok(Outlines { blocks, balls, groups, edges })
+        groups::of_edges(blocks, edges, block_groups);
+        Ok(Outlines { blocks, block_groups, groups, edges })
     }
 
     /// Edges that may be outlines.
@@ -134,8 +135,8 @@ impl<'m> Outlines<'m> {
     pub(crate) fn put(&self, writer: &mut Writer<'_>) -> Result<(), Error> {
         writer.put(&[Head { edges: self.edges as u64, facets: self.groups.len() as u64 }])?;
         writer.put(self.groups)?;
-        writer.put(self.balls)?;
-        writer.put(self.blocks)
+        writer.put(self.blocks)?;
+        writer.put(self.block_groups)
     }
 
     pub(crate) fn get(view: &mut View<'m>, facets: usize) -> Result<Outlines<'m>, Error> {
@@ -146,15 +147,15 @@ impl<'m> Outlines<'m> {
         }
         let (edges, facets) = (head.edges as usize, head.facets as usize);
         let groups = view.take::<u32>(facets)?;
-        let balls = view.take::<Balls>(facets.div_ceil(WIDTH))?;
         let blocks = view.take::<Block>(edges.div_ceil(WIDTH))?;
+        let block_groups = view.take::<EdgeGroups>(groups::count(blocks.len()))?;
         let known = |group: &u32| ((group & !BOTH) as usize) < facets;
         // coordinates of the scene, senses of facets and numbers of bodies
         let right = |(row, x): (usize, &f64)| x.abs() <= if row == EDGE_BLOCK_ROWS - 1 { 4e9 } else { 4.0 };
         let rows = blocks.iter().flat_map(|block| block.iter().enumerate());
         let mut values = rows.flat_map(|(row, lanes)| lanes.iter().map(move |x| (row, x)));
         if groups.iter().all(known) && values.all(right) {
-            Ok(Outlines { blocks, balls, groups, edges })
+            Ok(Outlines { blocks, block_groups, groups, edges })
         } else {
             Err(Error::Block)
         }
@@ -162,7 +163,7 @@ impl<'m> Outlines<'m> {
 
     /// Bytes in use.
     pub fn memory(&self) -> usize {
-        size_of_val(self.blocks) + size_of_val(self.balls) + size_of_val(self.groups)
+        size_of_val(self.block_groups) + size_of_val(self.blocks) + size_of_val(self.groups)
     }
 }
 
@@ -182,24 +183,6 @@ fn product(a: Vec3, b: Vec3) -> f64 {
 /// Whether a corner comes before another, by place.
 fn precedes(a: Vec3, b: Vec3) -> bool {
     edges::order(a, b) == core::cmp::Ordering::Less
-}
-
-/// The ball about the middle of each facet.
-fn enclose(corners: &[[Vec3; 3]], areas: &[f64], balls: &mut [Balls]) {
-    for (facet, (corners, area)) in corners.iter().zip(areas).enumerate() {
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let far = corners.iter().map(|c| (*c - middle).length_squared()).fold(0.0, f64::max);
-        // a negative radius meets nothing
-        let radius = if *area > 0.0 { crate::base::math::sqrt(far) } else { f64::NEG_INFINITY };
-        let values = [middle.x, middle.y, middle.z, radius];
-        if let Some(ball) = balls.get_mut(facet / WIDTH) {
-            ball.iter_mut().zip(values).for_each(|(lanes, x)| lanes.set(facet % WIDTH, x as f32));
-        }
-    }
-    let rest = corners.len() % WIDTH;
-    if let (true, Some([.., radii])) = (rest > 0, balls.last_mut()) {
-        radii.iter_mut().skip(rest).for_each(|r| *r = f32::NEG_INFINITY);
-    }
 }
 
 /// How the sky depends on direction, as far as outlines tell: what is open of it is a sum of these.

@@ -8,7 +8,7 @@ mod straight;
 mod sunlight;
 
 use fine_detail::{DetailCache, FINE_DETAIL_ERROR};
-pub(crate) use gather::{CAUTION, GATHERS};
+pub(crate) use gather::{CAUTION, GATHERS, finds_thrown_sun};
 use gather::{GatherPoint, Gathered, Onward};
 pub(crate) use occluders::{OccluderCache, Occluders};
 use straight::OpenAt;
@@ -83,17 +83,19 @@ const IMAGE_RAYS_LEAST: f64 = 2e6;
 
 impl ChainSettings {
     /// Settings for the images of a camera: where the rays suffice for all pixels that the object may fill, final
-    /// gathering is used on all but the best elements. `reflected` is
-    /// [`crate::radiosity::solution::Numbers::reflected`].
-    pub(crate) fn of_image(self, camera: &Camera, scene: &Scene<'_>, reflected: f64) -> ChainSettings {
+    /// gathering is used on all but the best elements. Clusters all have it: their
+    /// means tell nothing of a point.
+    pub(crate) fn of_image(self, camera: &Camera, solved: &Solved<'_>) -> ChainSettings {
         let ErrorBudget { solution, image, .. } = self.budget;
+        let (scene, reflected) = (solved.scene, solved.numbers.reflected);
         let all = camera.columns() * camera.rows();
         let spread = scene.largest_diffuse() * gather::spread(reflected);
         let each = gather::usual_rays(image / spread.max(f64::MIN_POSITIVE)).max(gather::GATHER_RAYS_FEWEST);
         let affords = |pixels: f64| pixels * each <= (self.rays as f64).max(IMAGE_RAYS_LEAST);
         // counting them takes a look at every facet
         let counts = GATHERS && solution > image && scene.facets() <= all;
-        let gather = if affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
+        let clusters = solved.elements.is_cluster(0);
+        let gather = if clusters || affords(all as f64) || counts && affords(camera.most_pixels(scene)) {
             if solution > image { GATHER_ALL } else { GATHER_MANY }
         } else {
             // most elements would need final gathering, and a finer solution costs less: only the worst do
@@ -797,7 +799,7 @@ impl Solved<'_> {
         let goes_on = self.goes_on(state, surface, unknown, mode.sample);
         let reflected_irradiance: &[f64] = if state.onward.is_some() && !goes_on {
             // rays from a point are many, and each meets another place: the mean over the element serves
-            let side = surface.facet * self.scene.sides() + surface.side;
+            let side = self.elements.kept_side(surface.facet, surface.side);
             self.images.mean(self.shape, side, unknown, level)
         } else {
             if !self.images.slots.is_empty() {

@@ -170,7 +170,7 @@ pub fn rows(
         return Err(Error::Range { field: Field::Rows, band: 0, value: range.end as f64 });
     }
     check(target, range.len() * camera.columns() * solved.shape.bands)?;
-    let settings = solved.settings.of_image(camera, solved.scene, solved.numbers.reflected);
+    let settings = solved.settings.of_image(camera, solved);
     let solved = &Solved { settings, ..*solved };
     let mut painter = Painter::new(solved, camera, range.end, scratch)?;
     if camera.is_parallel() {

@@ -1,16 +1,17 @@
 //! The outlines of one facet: the edges that are outlines from some of its points, and the facets over their pole.
 
 use super::contour::{self, Contour, spread, sweep};
+use super::groups::{Below, BelowLanes, Runs};
 use super::{
-    BOTH, Balls, Basis, Block, KEEPS_OUTLINES, OUTLINE_HEIGHT_SLACK, OpenSky, Outlines, circles, plane,
-    precedes, product,
+    BOTH, Basis, Block, KEEPS_OUTLINES, OUTLINE_HEIGHT_SLACK, OpenSky, Outlines, circles, plane, precedes,
+    product,
 };
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, frame, sqrt, unit};
 use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
-use crate::rays::bvh::Bvh;
+use crate::rays::bvh::{Bvh, HalfSpace};
 use crate::scene::Scene;
 
 /// Most edges that are examined for one facet: where more may be outlines, rays cost less.
@@ -164,12 +165,12 @@ impl<'m> Candidates<'m> {
         if self.list.side != name {
             let full =
                 self.used.0 + CANDIDATE_BLOCKS > self.pool.len() || self.used.1 + POLES > self.poles.len();
-            self.list = self.find(scene, outlines, isa, facet, name);
+            self.list = self.find(scene, (bvh, isa), facet, name);
             if self.list.edges == EDGES_TOO_MANY && full {
                 // make room, and once more
                 self.lists.fill(List::default());
                 self.used = (0, 0);
-                self.list = self.find(scene, outlines, isa, facet, name);
+                self.list = self.find(scene, (bvh, isa), facet, name);
             }
             self.lists.set(place, self.list);
         }
@@ -178,22 +179,16 @@ impl<'m> Candidates<'m> {
 
     /// Finds them behind what is in use.
     #[inline(never)]
-    fn find(
-        &mut self,
-        scene: &Scene<'_>,
-        outlines: &Outlines<'_>,
-        isa: Isa,
-        facet: usize,
-        name: u32,
-    ) -> List {
-        let corners = &scene.corners().at(facet);
+    fn find(&mut self, scene: &Scene<'_>, (bvh, isa): (&Bvh<'_>, Isa), facet: usize, name: u32) -> List {
+        let (outlines, corners) = (bvh.outlines(), &scene.corners().at(facet));
         let normal = self.normal;
         let height = corners.iter().map(|c| product(normal, *c)).fold(f64::INFINITY, f64::min);
+        let own = plane(&scene.corners().at((outlines.groups.at(facet) & !BOTH) as usize));
         let (blocks, poles) = self.used;
         let end = (blocks + CANDIDATE_BLOCKS).min(self.pool.len());
         let free = self.pool.part_mut(blocks..end);
-        let (edges, fits) = run_wide(isa, Sort { outlines, corners, normal, height, out: free });
-        let over = if fits { self.over_pole(scene, outlines, facet, corners, height) } else { None };
+        let (edges, fits) = run_wide(isa, Sort { outlines, corners, normal, own, height, out: free });
+        let over = if fits { self.over_pole(scene, bvh, facet, corners, height) } else { None };
         let Some(over) = over else { return List { side: name, edges: EDGES_TOO_MANY, ..List::default() } };
         self.used = (blocks + edges.div_ceil(WIDTH), poles + over);
         List {
@@ -214,33 +209,37 @@ impl<'m> Candidates<'m> {
     fn over_pole(
         &mut self,
         scene: &Scene<'_>,
-        outlines: &Outlines<'_>,
+        bvh: &Bvh<'_>,
         own: usize,
         corners: &[Vec3; 3],
         height: f64,
     ) -> Option<usize> {
         let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
         let far = corners.iter().map(|c| (*c - middle).length_squared()).fold(0.0, f64::max);
-        let about = [middle.x, middle.y, middle.z, sqrt(far)].map(|x| x as f32);
-        let axis = self.normal.to_array().map(|x| x as f32);
+        let outlines = bvh.outlines();
         let group = outlines.groups.at(own) & !BOTH;
         let end = (self.used.1 + POLES).min(self.poles.len());
         let places = self.poles.part_mut(self.used.1..end);
         let mut count = 0;
-        for (block, balls) in outlines.balls.iter().enumerate() {
-            let mut near = meets(balls, about, axis);
-            while near != 0 {
-                let facet = block * WIDTH + near.trailing_zeros() as usize;
-                near &= near - 1;
-                let of = outlines.groups.at(facet) & !BOTH;
-                let heights = scene.corners().at(facet).map(|c| product(self.normal, c) - height);
-                if of != group && heights.iter().any(|h| *h > OUTLINE_HEIGHT_SLACK) {
-                    *places.get_mut(count)? = facet as u32;
-                    count += 1;
-                }
+        let reach = sqrt(far) + OUTLINE_HEIGHT_SLACK;
+        let (x, y) = frame(self.normal);
+        let half = |normal: Vec3, least: f64| HalfSpace { normal, height: middle.dot(normal) - least };
+        let prism =
+            [half(x, reach), half(-x, reach), half(y, reach), half(-y, reach), half(self.normal, reach)];
+        let mut fits = true;
+        bvh.within(&prism, |facet| {
+            let of = outlines.groups.at(facet as usize) & !BOTH;
+            let heights = scene.corners().at(facet as usize).map(|c| product(self.normal, c) - height);
+            let rises = of != group && heights.iter().any(|h| *h > OUTLINE_HEIGHT_SLACK);
+            // leaves that share a packet show its facets twice
+            if rises && !places.head(count).contains(&facet) {
+                fits = count < places.len();
+                places.set(count, facet);
+                count += 1;
             }
-        }
-        Some(count)
+            fits
+        });
+        fits.then_some(count)
     }
 
     /// What is open over a point of the facet that was prepared; circles are added until the expected error is at most
@@ -354,27 +353,13 @@ fn winding(frame: &Frame, corners: &[Vec3; 3]) -> Option<bool> {
     (turn == side(1, 2) && turn == side(2, 0)).then_some(turn)
 }
 
-/// Which balls a cylinder about an axis meets that goes up from a ball.
-#[inline(always)]
-fn meets(balls: &Balls, [x, y, z, r]: [f32; 4], axis: [f32; 3]) -> u32 {
-    let [xs, ys, zs, rs] = balls;
-    let mut near = 0;
-    for lane in 0..WIDTH {
-        let (a, b, c) = (xs[lane] - x, ys[lane] - y, zs[lane] - z);
-        let up = a * axis[0] + b * axis[1] + c * axis[2];
-        let across = a * a + b * b + c * c - up * up;
-        // some roundings of numbers of size 4
-        let reach = (rs[lane] + r) * 1.000_01 + 4e-6;
-        near |= u32::from(rs[lane] >= 0.0 && up >= -reach && across <= reach * reach + 4e-6) << lane;
-    }
-    near
-}
-
 /// Finds the edges that rise above the facet's plane and are outlines from some point of it.
 struct Sort<'a> {
     outlines: &'a Outlines<'a>,
     corners: &'a [Vec3; 3],
     normal: Vec3,
+    /// Normal and distance of the plane that it shares with others, which cover nothing over it.
+    own: (Vec3, f64),
     height: f64,
     out: &'a mut [Block],
 }
@@ -384,13 +369,22 @@ impl WideTask for Sort<'_> {
 
     #[inline(always)]
     fn run<L: Lanes64>(self, lanes: L) -> (usize, bool) {
-        let Sort { outlines, corners, normal, height, out } = self;
+        let Sort { outlines, corners, normal, own, height, out } = self;
+        let shared = [own.0.x, own.0.y, own.0.z, own.1];
+        let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = sqrt(corners.iter().map(|c| (*c - centre).length_squared()).fold(0.0, f64::max));
+        let below = BelowLanes::new(lanes, &Below { centre, radius, normal, height });
         let n = spread(lanes, normal);
         let corners = [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])];
         let (least, doubt, zero) =
             (lanes.all(height + OUTLINE_HEIGHT_SLACK), lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0));
         let mut count = 0;
-        for (number, block) in outlines.blocks.iter().enumerate() {
+        let runs = Runs::new(&outlines.block_groups, outlines.blocks.len(), |groups| {
+            below.may_matter(lanes, groups)
+        });
+        for (number, block) in
+            runs.flat_map(|run| outlines.blocks.iter().enumerate().take(run.end).skip(run.start))
+        {
             let row = |k: usize| lanes.of(&block[k]);
             let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
             let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
@@ -403,8 +397,15 @@ impl WideTask for Sort<'_> {
             let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
             let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
             let rim = !L::F::bits(row(15).abs().gt(zero));
-            kept &= !same | rim;
-            let last = outlines.edges - number * WIDTH;
+            // a plane that is the same only to rounding rises above itself here and there
+            let mut apart = [zero; 2];
+            for (k, x) in shared.into_iter().enumerate() {
+                apart[0] = apart[0].max((row(6 + k) - lanes.all(x)).abs());
+                apart[1] = apart[1].max((row(10 + k) - lanes.all(x)).abs());
+            }
+            let others = [L::F::bits(apart[0].gt(zero)), L::F::bits(apart[1].gt(zero))];
+            kept &= !same | rim | !others[0] | !others[1];
+            let last = outlines.edges.saturating_sub(number * WIDTH);
             if last < WIDTH {
                 kept &= (1 << last) - 1;
             }
@@ -414,6 +415,10 @@ impl WideTask for Sort<'_> {
                 let Some(to) = out.get_mut(count / WIDTH) else { return (count, false) };
                 for (to, from) in to.iter_mut().zip(block) {
                     to[count % WIDTH] = from[lane];
+                }
+                for (number, _) in others.iter().enumerate().filter(|(_, others)| *others >> lane & 1 == 0) {
+                    to[14 + number][count % WIDTH] = 0.0;
+                    to[16 + number][count % WIDTH] = 0.0;
                 }
                 count += 1;
             }

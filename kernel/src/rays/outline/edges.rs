@@ -24,11 +24,14 @@ const NOBODY: u32 = u32::MAX;
 /// Where an edge lies along a curve through the scene, and the sides of facets that it is: three times the facet, and which.
 type Pair = [u32; 3];
 
+/// A key by which sides of facets are sorted first, and three times the facet and which side it is.
+type Half = [u32; 2];
+
 /// Memory while edges are found.
 pub struct Build<'s, 'm> {
     corners: &'s [[Vec3; 3]],
     areas: &'s [f64],
-    halves: &'m mut [u32],
+    halves: &'m mut [Half],
     pairs: &'m mut [Pair],
     bodies: &'m mut [u32],
 }
@@ -42,7 +45,7 @@ pub struct Found<'s, 'm> {
 
 impl<'s, 'm> Build<'s, 'm> {
     pub fn need(need: Need, facets: usize, most: usize) -> Need {
-        need.and::<u32>(3 * facets).and::<Pair>(most).and::<u32>(facets)
+        need.and::<Half>(3 * facets).and::<Pair>(most).and::<u32>(facets)
     }
 
     pub fn new(
@@ -51,7 +54,7 @@ impl<'s, 'm> Build<'s, 'm> {
         most: usize,
         arena: &mut Arena<'m>,
     ) -> Result<Build<'s, 'm>, Error> {
-        let halves = arena.take::<u32>(3 * corners.len())?;
+        let halves = arena.take::<Half>(3 * corners.len())?;
         let pairs = arena.take::<Pair>(most)?;
         let bodies = arena.take::<u32>(corners.len())?;
         Ok(Build { corners, areas, halves, pairs, bodies })
@@ -63,14 +66,17 @@ impl<'s, 'm> Build<'s, 'm> {
         let mut count = 0;
         for (facet, _) in areas.iter().enumerate().filter(|(_, area)| **area > 0.0) {
             for side in 0..3 {
-                halves.set(count, (3 * facet + side) as u32);
+                let half = (3 * facet + side) as u32;
+                halves.set(count, [key(ends(corners, half).0.x), half]);
                 count += 1;
             }
         }
         let (halves, _) = halves.split_at_mut(count.min(halves.len()));
         sort(halves, &|a, b| {
-            let ((p, q, _), (r, s, _)) = (ends(corners, *a), ends(corners, *b));
-            order(p, r).then(order(q, s))
+            a[0].cmp(&b[0]).then_with(|| {
+                let ((p, q, _), (r, s, _)) = (ends(corners, a[1]), ends(corners, b[1]));
+                order(p, r).then(order(q, s))
+            })
         });
         for set in [&mut *groups, &mut *bodies] {
             set.iter_mut().enumerate().for_each(|(facet, to)| *to = facet as u32);
@@ -140,9 +146,19 @@ fn ends(corners: &[[Vec3; 3]], half: u32) -> (Vec3, Vec3, bool) {
     if order(from, to) == Ordering::Less { (from, to, true) } else { (to, from, false) }
 }
 
+/// A number that grows with a coordinate, to 24 bits.
+fn key(x: f64) -> u32 {
+    // the order of numbers is that of their bits, but for negative ones; both zeros are one
+    let bits = (x as f32 + 0.0).to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
 /// Sides between the same ends.
-fn runs<'h>(corners: &[[Vec3; 3]], halves: &'h [u32]) -> impl Iterator<Item = &'h [u32]> {
-    halves.chunk_by(|a, b| {
+fn runs<'h>(corners: &[[Vec3; 3]], halves: &'h [Half]) -> impl Iterator<Item = &'h [Half]> {
+    halves.chunk_by(|[key, a], [other, b]| {
+        if key != other {
+            return false;
+        }
         let ((p, q, _), (r, s, _)) = (ends(corners, *a), ends(corners, *b));
         order(p, r).then(order(q, s)) == Ordering::Equal
     })
@@ -167,12 +183,12 @@ fn unite(sets: &mut [u32], a: u32, b: u32) {
 }
 
 /// Joins the bodies of the facets in one edge, and the planes of those that have the same.
-fn join(corners: &[[Vec3; 3]], run: &[u32], groups: &mut [u32], bodies: &mut [u32]) {
+fn join(corners: &[[Vec3; 3]], run: &[Half], groups: &mut [u32], bodies: &mut [u32]) {
     for pair in run.windows(2) {
-        unite(bodies, pair.at(0) / 3, pair.at(1) / 3);
+        unite(bodies, pair.at(0)[1] / 3, pair.at(1)[1] / 3);
     }
-    for (at, &a) in run.iter().enumerate().take(MOST_PAIRED) {
-        for &b in run.iter().take(MOST_PAIRED).skip(at + 1) {
+    for (at, &[_, a]) in run.iter().enumerate().take(MOST_PAIRED) {
+        for &[_, b] in run.iter().take(MOST_PAIRED).skip(at + 1) {
             let (f, g) = (find(groups, a / 3), find(groups, b / 3));
             if ends(corners, a).2 != ends(corners, b).2
                 && coplanar(corners, f, a / 3)
@@ -198,21 +214,21 @@ fn coplanar(corners: &[[Vec3; 3]], of: u32, facet: u32) -> bool {
 }
 
 /// Calls `each` with the sides that meet in one edge: two of opposite senses, or one. Pairs of one plane are left out.
-fn pair(corners: &[[Vec3; 3]], run: &[u32], groups: &[u32], mut each: impl FnMut(u32, u32)) {
+fn pair(corners: &[[Vec3; 3]], run: &[Half], groups: &[u32], mut each: impl FnMut(u32, u32)) {
     if run.len() > MOST_PAIRED {
-        run.iter().for_each(|&half| each(half, NOBODY));
+        run.iter().for_each(|&[_, half]| each(half, NOBODY));
         return;
     }
     let group = |half: u32| groups.at(half as usize / 3);
     let mut used = 0u32;
     for same in [true, false] {
-        for (i, &a) in run.iter().enumerate() {
-            let other = run.iter().enumerate().skip(i + 1).find(|&(j, &b)| {
+        for (i, &[_, a]) in run.iter().enumerate() {
+            let other = run.iter().enumerate().skip(i + 1).find(|&(j, &[_, b])| {
                 used & (1 << i | 1 << j) == 0
                     && ends(corners, a).2 != ends(corners, b).2
                     && (!same || group(a) == group(b))
             });
-            if let Some((j, &b)) = other {
+            if let Some((j, &[_, b])) = other {
                 used |= 1 << i | 1 << j;
                 if !same {
                     each(a, b);
@@ -220,7 +236,7 @@ fn pair(corners: &[[Vec3; 3]], run: &[u32], groups: &[u32], mut each: impl FnMut
             }
         }
     }
-    run.iter().enumerate().filter(|(i, _)| used & 1 << i == 0).for_each(|(_, &a)| each(a, NOBODY));
+    run.iter().enumerate().filter(|(i, _)| used & 1 << i == 0).for_each(|(_, &[_, a])| each(a, NOBODY));
 }
 
 /// Place of an edge's middle along a curve that fills the scene.

@@ -64,10 +64,11 @@ impl Solved<'_> {
         far: f64,
         known: &mut DetailCache,
     ) -> bool {
-        let element = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
+        let element = self.elements.area(self.scene, unknown);
         let pixel = self.settings.pixel.at(far);
         let near = |many: bool| Near { normal: surface.normal, size: sqrt(element), many };
         GATHERS
+            && !self.elements.is_cluster(unknown)
             && element > DETAIL_PIXELS_LEAST * pixel
             && self.bvh.is_own()
             && self.element_has_fine_detail(unknown, &near(true), known)

@@ -20,7 +20,7 @@ use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::coupling::element::Local;
 use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
-use crate::scene::MAX_BANDS;
+use crate::scene::{MAX_BANDS, Scene};
 
 /// Whether final gathering is available: not where stack and memory are small.
 pub(crate) const GATHERS: bool = cfg!(feature = "std");
@@ -259,7 +259,26 @@ pub(super) struct GatherPoint<'a> {
     pub open: Option<&'a OpenAt<'a>>,
 }
 
+/// Whether rays from points find the sunlight that mirrors reflect beside its images.
+pub(crate) fn finds_thrown_sun(scene: &Scene<'_>) -> bool {
+    let mut materials = 0..scene.materials();
+    scene.largest_specular() == 0.0
+        || !scene.is_smooth()
+            && materials.all(|m| scene.gloss(m).is_none_or(|ratio| ratio <= GATHER_LOBE_RATIO_MOST))
+}
+
 impl Solved<'_> {
+    /// By which number what is found at a point serves others of its pixel: its element's, or its facet's in a cluster, whose
+    /// facets see another sky each.
+    #[inline]
+    pub(super) fn pixel_key(&self, surface: &Surface, unknown: usize) -> usize {
+        if self.elements.is_cluster(unknown) {
+            self.elements.unknowns() + surface.facet * self.scene.sides() + surface.side
+        } else {
+            unknown
+        }
+    }
+
     /// Whether what is expected of an unknown's error is too much, and rays from a point find all light that its irradiance
     /// holds: not the sunlight that narrow lobes and curved mirrors reflect, nor flat ones where there are too many.
     #[inline]
@@ -267,7 +286,7 @@ impl Solved<'_> {
         let most = self.settings.gather * self.settings.budget.image;
         self.gathers()
             && weight * weight * variance > most * most
-            && (self.light.sun.is_none() || self.finds_thrown_sun() && self.knows_images(surface))
+            && (self.light.sun.is_none() || finds_thrown_sun(self.scene) && self.knows_images(surface))
     }
 
     /// Whether any point may want rays.
@@ -277,16 +296,8 @@ impl Solved<'_> {
     }
 
     pub(super) fn knows_images(&self, surface: &Surface) -> bool {
-        let side = surface.facet * self.scene.sides() + surface.side;
+        let side = self.elements.kept_side(surface.facet, surface.side);
         self.images.are_known(side)
-    }
-
-    /// Whether rays from points find the sunlight that mirrors reflect beside its images.
-    fn finds_thrown_sun(&self) -> bool {
-        let mut materials = 0..self.scene.materials();
-        self.scene.largest_specular() == 0.0
-            || !self.scene.is_smooth()
-                && materials.all(|m| self.scene.gloss(m).is_none_or(|ratio| ratio <= GATHER_LOBE_RATIO_MOST))
     }
 
     /// By how much the irradiance at a point differs from its element's, one value a band, and the expected squared error
@@ -301,7 +312,8 @@ impl Solved<'_> {
         mode: &mut Mode<'_, '_>,
         path: &mut Path,
     ) -> Option<(&'g [f64], f64)> {
-        let place = match gathered.find(gather_point.unknown) {
+        let key = self.pixel_key(gather_point.surface, gather_point.unknown);
+        let place = match gathered.find(key) {
             Some(place) => place,
             None => {
                 let place = gathered.count as usize;
@@ -311,7 +323,7 @@ impl Solved<'_> {
                 let (exact, rays) = self.trace(gather_point, images, gathered, mode, path)?;
                 let error = self.store_correction(gather_point, gathered, place, exact, rays);
                 gathered.errors.set(place, error);
-                gathered.unknowns.set(place, gather_point.unknown as u64);
+                gathered.unknowns.set(place, key as u64);
                 gathered.count = place as u64 + 1;
                 place
             }
@@ -458,7 +470,7 @@ impl Solved<'_> {
         let (Some(onward), RaySample::Stratum { seed, index }) = (&mut state.onward, sample) else {
             return false;
         };
-        let area = self.scene.areas().at(surface.facet) * self.elements.share(unknown);
+        let area = self.elements.area(self.scene, unknown);
         if onward.ray.is_some()
             || onward.depth >= MOST_ONWARD
             || state.step * state.step > ONWARD_SIZE_MOST * ONWARD_SIZE_MOST * area

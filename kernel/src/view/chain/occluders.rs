@@ -163,7 +163,7 @@ impl<'m> OccluderCache<'m> {
     /// The images of the sun that may be seen from a point of a surface.
     pub(super) fn images<'a>(&mut self, solved: &Solved<'a>, surface: &Surface, spread: f64) -> Walk<'a> {
         let sides = solved.elements.facet_sides();
-        let side = surface.facet * solved.scene.sides() + surface.side;
+        let side = solved.elements.kept_side(surface.facet, surface.side);
         let near = |reach: f64| solved.images.near(sides, side, surface.point, reach, spread);
         let Some(images) = &mut self.images else { return Walk::All(near(0.0)) };
         let apart = surface.point - images.centre;
@@ -250,7 +250,7 @@ impl Solved<'_> {
         }
         let Some(normal) = self.scene.flat_normal(facet, side) else { return false };
         let mirrored = reflect(axis, normal);
-        let place = facet * self.scene.sides() + side;
+        let place = self.elements.kept_side(facet, side);
         1.0 - mirrored.dot(sun.direction()) < SUN_DISTANCE_LEAST
             || self.images.may_show(self.elements.facet_sides(), place, mirrored)
     }

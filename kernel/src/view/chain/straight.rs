@@ -75,7 +75,8 @@ impl<'a> Solved<'a> {
         occluders: &mut OccluderCache<'_>,
     ) -> Option<OpenAt<'a>> {
         let bands = self.shape.bands.min(BANDS);
-        if let Some(place) = kept.find(unknown) {
+        let key = self.pixel_key(surface, unknown);
+        if let Some(place) = kept.find(key) {
             let (held, _) = self.straight.of(unknown, bands)?;
             let [known, beyond, variance] = kept.rest.at(place);
             let mut irradiance = kept.beyond.get(place).copied()?;
@@ -97,7 +98,7 @@ impl<'a> Solved<'a> {
         let open = self.open_at(surface, unknown, local, occluders);
         let place = kept.count as usize;
         if place < PIXEL_ELEMENTS_KEPT {
-            kept.unknowns.set(place, unknown as u64);
+            kept.unknowns.set(place, key as u64);
             kept.count += 1;
             let Some(open) = &open else {
                 kept.rest.set(place, [0.0; 3]);

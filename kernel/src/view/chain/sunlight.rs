@@ -258,7 +258,7 @@ impl Solved<'_> {
             mirrors += 1;
             axis = reflect(axis, normal);
             let (sides, side) =
-                (self.elements.facet_sides(), surface.facet * self.scene.sides() + surface.side);
+                (self.elements.facet_sides(), self.elements.kept_side(surface.facet, surface.side));
             if 1.0 - axis.dot(sun.direction()) >= SUN_DISTANCE_LEAST
                 && !self.images.may_show(sides, side, axis)
             {

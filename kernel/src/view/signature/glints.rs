@@ -152,7 +152,7 @@ impl Glints<'_, '_, '_> {
         let surface = Surface::new(scene, facet, side, 1.0 / 3.0, 1.0 / 3.0);
         let Some(mirror) = surface.mirror(scene) else { return };
         let most = solved.settings.max_bounces.map_or(u32::MAX, |most| most - 1);
-        let place = facet * scene.sides() + side;
+        let place = solved.elements.kept_side(facet, side);
         let images = solved.images.of(solved.elements.facet_sides(), place);
         let suns = core::iter::once((*sun, true)).chain(images.map(|axis| (sun.seen_toward(axis), false)));
         for (sun, straight) in suns {
