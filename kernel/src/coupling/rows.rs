@@ -492,8 +492,7 @@ impl Tracer<'_, '_> {
         let enclosed = self.settings.directional
             && !hidden
             && !closed
-            // a cluster's facets see another sky each: what is open has all of it
-            && (cluster || 2 * (tally.blocked + seen).saturating_sub(counted) > seen);
+            && 2 * (tally.blocked + seen).saturating_sub(counted) > seen;
         let dropped = if enclosed { BLOCKED } else { STRAIGHT };
         let stats = Row {
             state: if enclosed { ENCLOSED } else { TRACED },

@@ -14,6 +14,7 @@ use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{BLOCKED, ENCLOSED, RowView};
 use crate::radiosity::System;
+use crate::radiosity::straight;
 use crate::scene::sky::Sky;
 use crate::scene::{MAX_BANDS, Scene};
 use core::ops::Range;
@@ -70,6 +71,9 @@ pub fn differences(
     Ok(())
 }
 
+/// Relative error of the irradiances of the whole sky whose variance over a cluster's facets counts.
+const TURNED_SKY_ERROR: f64 = 1e-2;
+
 /// [`differences`] at work.
 struct Differences<'a, 'o> {
     system: &'a System<'a>,
@@ -109,11 +113,19 @@ impl LaneTask for Differences<'_, '_> {
                 about_mean(system, unknown, &row, radiance, lanes, light, sums);
             }
             let function = if system.elements.is_cluster(unknown) { 1.0 } else { LINEAR_VARIANCE };
+            // what facets of a cluster see of the sky differs, whatever is in its way
+            let turned = match &system.light.sky {
+                Some(sky) if !known && system.elements.is_cluster(unknown) => {
+                    let of = (system.scene, system.elements);
+                    straight::whole_sky(of, (sky, TURNED_SKY_ERROR), unknown, reference, light)
+                }
+                _ => 0.0,
+            };
             for (((out, sums), mean), reference) in out.iter_mut().zip(&*sums).zip(&*means).zip(reference) {
                 let scale = if *reference > 0.0 { 1.0 / reference } else { 0.0 };
                 let sums = sums.map(|s| scale * s);
                 let mean = if cluster { scale * mean } else { sums[0] + sums[1] };
-                *out = [narrow(mean), narrow(square(sums, function))];
+                *out = [narrow(mean), narrow(square(sums, function) + turned)];
             }
         }
     }

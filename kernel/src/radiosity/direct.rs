@@ -12,7 +12,7 @@ use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
 use crate::coupling::mirror_path::STRAIGHT;
 use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, OPEN, RowView};
-use crate::radiosity::straight::{Blocked, Straight};
+use crate::radiosity::straight::{self, Blocked, Straight};
 use crate::rays::bvh::Bvh;
 use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
@@ -124,7 +124,7 @@ impl LaneTask for SkyRows<'_, '_> {
             } else if row.row.state != ENCLOSED {
                 let own = elements.facet_of(unknown);
                 if of != Some(own) {
-                    sky.irradiance(scene.side_normal(own.0, own.1), relative_error, unobstructed);
+                    straight::whole_sky((scene, elements), (sky, relative_error), unknown, &[], unobstructed);
                     of = Some(own);
                 }
                 pieces(values, 3 * bands).for_each(|part| copy(part, unobstructed));

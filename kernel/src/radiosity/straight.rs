@@ -280,9 +280,10 @@ impl LaneTask for ClusterSky<'_, '_> {
         let mut checks = [[0.0; 4]; MAX_BANDS];
         let (light, checks) = (light.head_mut(bands), checks.head_mut(bands));
         let enclosed = row.row.state == ENCLOSED;
-        if !enclosed {
-            let (facet, side) = of.elements.facet_of(unknown);
-            of.sky.irradiance(of.scene.side_normal(facet, side), of.goal, values.head_mut(bands));
+        let whole = ((of.scene, of.elements), (of.sky, of.goal));
+        let of_normals = whole_sky(whole.0, whole.1, unknown, of.reference, values.head_mut(bands));
+        if enclosed {
+            values.head_mut(bands).fill(0.0);
         }
         for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
             of.sky.sum(lanes, bundle.packed, light);
@@ -296,8 +297,46 @@ impl LaneTask for ClusterSky<'_, '_> {
         let relative = checks.iter().zip(of.reference).filter(|(_, reference)| **reference > 0.0);
         let variance =
             relative.map(|(checks, reference)| accuracy::square(checks.map(|c| c / reference), 1.0));
-        Some(variance.fold(0.0, f64::max))
+        Some(variance.fold(0.0, f64::max) + of_normals)
     }
+}
+
+/// Irradiance that the whole sky brings an unknown, one value per band of `out`: of a cluster the mean over 16 of its facets,
+/// one of each part of its area. Returns the variance of that over them, over pi and relative to the reference radiance, in
+/// the band where it is largest.
+pub fn whole_sky(
+    (scene, elements): (&Scene<'_>, &Elements<'_>),
+    (sky, relative_error): (&Sky<'_>, f64),
+    unknown: usize,
+    reference: &[f64],
+    out: &mut [f64],
+) -> f64 {
+    let (own, side) = elements.facet_of(unknown);
+    if !elements.is_cluster(unknown) || sky.is_uniform() {
+        sky.irradiance(scene.side_normal(own, side), relative_error, out);
+        return 0.0;
+    }
+    let (mut light, mut squares) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
+    let light = light.head_mut(out.len());
+    out.fill(0.0);
+    const POINTS: usize = QUARTERS * QUARTERS;
+    let mut last = None;
+    for number in 0..POINTS {
+        let (a, b) = place(number, 2);
+        let (facet, ..) = elements.place(unknown / scene.sides().max(1), a, b);
+        let normal = scene.side_normal(facet, side);
+        if last != Some(normal) {
+            sky.irradiance(normal, relative_error, light);
+            last = Some(normal);
+        }
+        for ((sum, square), x) in out.iter_mut().zip(&mut squares).zip(&*light) {
+            *sum += x / POINTS as f64;
+            *square += x * x / POINTS as f64;
+        }
+    }
+    let bands = out.iter().zip(squares).zip(reference).filter(|(_, reference)| **reference > 0.0);
+    let variance = bands.map(|((mean, square), l)| (square - mean * mean).max(0.0) / (PI * PI * l * l));
+    variance.fold(0.0, f64::max)
 }
 
 /// Straight sky at the middles of an element's quarters of one depth: sums of what is seen and, last, of the share that is

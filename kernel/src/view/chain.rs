@@ -110,6 +110,13 @@ impl ChainSettings {
         ChainSettings { gather, pixel, ..self }
     }
 
+    /// Settings for single points: final gathering on all but the best elements, and all light that a facet receives.
+    pub(crate) fn of_points(self) -> ChainSettings {
+        // the facet's own reflection is one more
+        let max_bounces = self.max_bounces.map(|most| most.saturating_add(1));
+        ChainSettings { gather: GATHER_ALL, max_bounces, ..self }
+    }
+
     /// Settings for sums over many rays, in which errors of single elements count little: no final gathering.
     pub(crate) fn of_sums(self) -> ChainSettings {
         ChainSettings { gather: f64::INFINITY, apart: true, ..self }
@@ -889,6 +896,7 @@ impl Solved<'_> {
             variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
         let by_element = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
+        let by_element = by_element + self.turned_sky(surface, unknown);
         if let Some(kept) = gathered.as_deref_mut()
             && (self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element))
         {

@@ -4,10 +4,11 @@ use super::gather::{BANDS, PIXEL_ELEMENTS_KEPT, find};
 use super::{OccluderCache, Solved, linear};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
-use crate::base::math::{clamp, fabs};
+use crate::base::math::{PI, clamp, fabs};
 use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
+use crate::scene::MAX_BANDS;
 
 /// Largest share of the wanted error of images that circles may leave at a point.
 const CIRCLES_ERROR_SHARE: f64 = 0.25;
@@ -113,6 +114,25 @@ impl<'a> Solved<'a> {
             }
         }
         open
+    }
+
+    /// Squared difference of the irradiance over pi that the whole sky brings a facet of a cluster from what it brings the
+    /// cluster's largest, which faces elsewhere, relative to the reference radiance, in the band where that is most.
+    pub(super) fn turned_sky(&self, surface: &Surface, unknown: usize) -> f64 {
+        let (Some(sky), true) = (&self.light.sky, self.elements.is_cluster(unknown)) else { return 0.0 };
+        let (largest, side) = self.elements.facet_of(unknown);
+        let normals = [surface.normal, self.scene.side_normal(largest, side)];
+        if sky.is_uniform() || normals[0] == normals[1] {
+            return 0.0;
+        }
+        let mut light = [[0.0; MAX_BANDS]; 2];
+        for (light, normal) in light.iter_mut().zip(normals) {
+            sky.irradiance(normal, self.settings.budget.sky, light.head_mut(self.shape.bands));
+        }
+        let [own, other] = light;
+        let bands = own.iter().zip(other).zip(self.reference).filter(|(_, reference)| **reference > 0.0);
+        let square = bands.map(|((own, other), reference)| (own - other) / (PI * reference)).map(|x| x * x);
+        square.fold(0.0, f64::max)
     }
 
     /// Whether the linear function over an element of this expected squared error is too little for a point of such a
