@@ -379,9 +379,8 @@ impl WideTask for Sort<'_> {
         let (least, doubt, zero) =
             (lanes.all(height + OUTLINE_HEIGHT_SLACK), lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0));
         let mut count = 0;
-        let runs = Runs::new(&outlines.block_groups, outlines.blocks.len(), |groups| {
-            below.may_matter(lanes, groups)
-        });
+        let runs =
+            Runs::new(outlines.block_groups, outlines.blocks.len(), |groups| below.may_matter(lanes, groups));
         for (number, block) in
             runs.flat_map(|run| outlines.blocks.iter().enumerate().take(run.end).skip(run.start))
         {
