@@ -58,7 +58,7 @@ pub struct Clusters<'m> {
     leaves: &'m [Leaf],
 }
 
-/// Clusters that a scene of so many facets is to have at a solution's tolerance; 0: its facets stay alone.
+/// Number of clusters wanted of a scene of `facets` facets at a solution's tolerance; 0: its facets stay alone.
 pub fn wanted(facets: usize, tolerance: f64) -> usize {
     let clusters = CLUSTERS / tolerance;
     if facets > CLUSTERED_FACETS && facets as f64 > WORTH * clusters { clusters as usize } else { 0 }
@@ -70,13 +70,13 @@ fn room(facets: usize, clusters: usize) -> usize {
 }
 
 impl<'m> Clusters<'m> {
-    /// Bytes for a scene of so many facets, of which so many clusters are wanted.
+    /// Bytes for a scene of `facets` facets, of which `clusters` clusters are wanted.
     pub fn need(facets: usize, clusters: usize) -> Need {
         let facets_in_tree = if clusters == 0 { 0 } else { facets };
         Need::new().and::<u32>(facets_in_tree).and::<Leaf>(room(facets, clusters))
     }
 
-    /// About so many clusters of a scene's facets; none where its materials and large facets alone are more than there is room
+    /// The clusters of a scene's facets, about `clusters` of them; none where its materials and large facets alone are more than there is room
     /// for. `area` is that of the object, over which errors are taken.
     pub fn new(
         scene: &Scene<'_>,
@@ -205,7 +205,7 @@ impl Tree<'_, '_> {
         Some(())
     }
 
-    /// Splits leaves until there are so many, beside the large facets.
+    /// Splits leaves until they are `clusters`.
     fn grow(&mut self, clusters: usize) -> Option<()> {
         let most = clusters.min(self.leaves.len());
         while self.used < most {

@@ -161,7 +161,7 @@ fn most_nodes(facets: usize, tolerance: f64) -> usize {
 }
 
 impl<'m> SubdivisionTree<'m> {
-    /// Bytes for the trees of `facets` facets, of which so many `clusters` are wanted.
+    /// Bytes for the trees of `facets` facets, of which `clusters` clusters are wanted.
     pub fn bytes(facets: usize, tolerance: f64, clusters: usize) -> Result<usize, Error> {
         let nodes = most_nodes(facets, tolerance);
         // two sides and the flag bit of a coupling's record must fit into 32 bits
@@ -172,7 +172,7 @@ impl<'m> SubdivisionTree<'m> {
         Clusters::need(facets, clusters).and::<Node>(nodes).and::<f64>(nodes).bytes()
     }
 
-    /// Every facet whole, and to be probed where it is not in one of about so many `clusters`.
+    /// Every facet whole, and to be probed where it is in none of about `clusters` clusters.
     pub fn new(
         scene: &Scene<'_>,
         budget: &ErrorBudget,
