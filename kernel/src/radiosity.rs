@@ -66,7 +66,7 @@ impl System<'_> {
     /// Radiance before any reflection of the sides of `range`: their emission.
     pub fn start(&self, range: Range<usize>, radiance: &mut [f64]) {
         for (unknown, out) in range.zip(pieces(radiance, self.shape.bands)) {
-            copy(out, self.emission(unknown));
+            out.iter_mut().enumerate().for_each(|(band, out)| *out = self.emission(unknown, band));
         }
     }
 
@@ -92,7 +92,7 @@ impl System<'_> {
         let sums = sums.head_mut(bands);
         for ((unknown, row), out) in self.coupling.rows(range).zip(pieces(to, bands)) {
             let material = self.material(unknown);
-            let (diffuse, emission) = (self.scene.diffuse(material), self.emission(unknown));
+            let diffuse = self.scene.diffuse(material);
             row.gather(from, sums);
             let direct = self.direct.part(self.shape.at(unknown, 0));
             let scale = PI * self.scale(unknown, &row);
@@ -103,7 +103,7 @@ impl System<'_> {
                 }
                 // eq. (12): I = I_0 + rho_d/pi E, E = E_0 + pi sum phi I; what gradients add to E_0 may be negative, where
                 // next to nothing arrives
-                let new = emission.at(band) + diffuse.at(band) * FRAC_1_PI * irradiance.max(0.0);
+                let new = self.emission(unknown, band) + diffuse.at(band) * FRAC_1_PI * irradiance.max(0.0);
                 let old = from.at(unknown * bands + band);
                 let reference = reference.at(band);
                 let step = fabs(new - old);
@@ -324,7 +324,7 @@ impl System<'_> {
             for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
                 let facet = self.elements.facet_of(unknown).0;
                 let area = self.scene.areas().at(facet) * self.elements.share(unknown);
-                sent += area * self.emission(unknown).at(band);
+                sent += area * self.emission(unknown, band);
                 if self.scene.diffuse(self.scene.material(facet)).at(band) > 0.0 {
                     let area = area * f64::from(row.row.visible_share);
                     sum += area * irradiance.at(self.shape.at(unknown, self.shape.levels - 1).start + band);
@@ -343,11 +343,11 @@ impl System<'_> {
     pub fn reflect(&self, range: Range<usize>, level: usize, irradiance: &[f64], out: &mut [f64]) {
         for (unknown, out) in range.zip(pieces(out, self.shape.bands)) {
             let material = self.material(unknown);
-            let (diffuse, emission) = (self.scene.diffuse(material), self.emission(unknown));
+            let diffuse = self.scene.diffuse(material);
             let mean = irradiance.part(self.shape.at(unknown, level));
             for (band, out) in out.iter_mut().enumerate() {
                 let sun = self.light.sun.as_ref().map_or(0.0, |s| self.sun.at(unknown) * s.irradiance(band));
-                *out = emission.at(band) + diffuse.at(band) * FRAC_1_PI * (mean.at(band) + sun);
+                *out = self.emission(unknown, band) + diffuse.at(band) * FRAC_1_PI * (mean.at(band) + sun);
             }
         }
     }
@@ -362,11 +362,19 @@ impl System<'_> {
         self.scene.material(self.elements.facet_of(unknown).0)
     }
 
-    /// Own diffuse radiance, one value per band.
+    /// Own diffuse radiance in a band, mean over the element.
     #[inline]
-    fn emission(&self, unknown: usize) -> &[f64] {
+    fn emission(&self, unknown: usize, band: usize) -> f64 {
         let (facet, side) = self.elements.facet_of(unknown);
-        self.light.emission(self.scene, facet, side)
+        if !self.elements.is_cluster(unknown) || self.light.emission.is_empty() {
+            return self.light.emission(self.scene, facet, side).at(band);
+        }
+        let of = |facet: &u32| {
+            let facet = *facet as usize;
+            self.light.emission(self.scene, facet, side).at(band) * self.scene.areas().at(facet)
+        };
+        let area = self.elements.area(self.scene, unknown);
+        if area > 0.0 { self.elements.facets_of(unknown).iter().map(of).sum::<f64>() / area } else { 0.0 }
     }
 }
 

@@ -233,10 +233,19 @@ impl System<'_> {
     ) {
         let bands = self.shape.bands.clamp(1, MAX_BANDS);
         for unknown in 0..self.coupling.unknowns() {
-            let (facet, side) = self.elements.facet_of(unknown);
-            let rho = self.scene.diffuse(self.scene.material(facet));
-            for band in 0..bands {
-                let weight = lambda.at(unknown * bands + band);
+            let side = self.elements.facet_of(unknown).1;
+            let rho = self.scene.diffuse(self.material(unknown));
+            let area = self.elements.area(self.scene, unknown);
+            // facets of a cluster take part by their areas
+            let cluster = self.elements.is_cluster(unknown);
+            for (facet, band) in self
+                .elements
+                .facets_of(unknown)
+                .iter()
+                .flat_map(|facet| (0..bands).map(move |band| (*facet as usize, band)))
+            {
+                let share = if cluster && area > 0.0 { self.scene.areas().at(facet) / area } else { 1.0 };
+                let weight = share * lambda.at(unknown * bands + band);
                 let place = (facet * self.scene.sides() + side) * bands + band;
                 emission.set(place, emission.at(place) + weight);
                 if rho.at(band) > 0.0 {

@@ -67,7 +67,7 @@ fn at_middle(solved: &Solved<'_>, facet: usize, side: usize, irradiance: &mut [f
     solved.radiance_at((&ray, Some(hit)), RaySample::Integrate(facet as u32), &mut terms, &mut {
         ChainScratch::ZERO
     });
-    let own = scene.emission(surface.material).iter().zip(scene.diffuse(surface.material));
+    let own = solved.light.emission(scene, facet, side).iter().zip(scene.diffuse(surface.material));
     for (((l, e), shown), (emission, diffuse)) in
         radiance.iter_mut().zip(irradiance).zip(&terms.diffuse).zip(own)
     {
