@@ -1,7 +1,7 @@
 //! The outlines of one facet: the edges that are outlines from some of its points, and the facets over their pole.
 
 use super::contour::{self, Contour, spread, sweep};
-use super::groups::{Below, BelowLanes, Runs};
+use super::groups::{Below, BelowLanes, GROUP};
 use super::{
     BOTH, Basis, Block, KEEPS_OUTLINES, OUTLINE_HEIGHT_SLACK, OpenSky, Outlines, circles, plane, precedes,
     product,
@@ -353,6 +353,10 @@ fn winding(frame: &Frame, corners: &[Vec3; 3]) -> Option<bool> {
     (turn == side(1, 2) && turn == side(2, 0)).then_some(turn)
 }
 
+/// Farthest that a facet lies from the plane that it shares with others (scene coordinates): ten times what facets that share
+/// one are held to.
+const SHARED_PLANE_SLACK: f64 = 1e-6;
+
 /// Finds the edges that rise above the facet's plane and are outlines from some point of it.
 struct Sort<'a> {
     outlines: &'a Outlines<'a>,
@@ -378,48 +382,63 @@ impl WideTask for Sort<'_> {
         let corners = [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])];
         let (least, doubt, zero) =
             (lanes.all(height + OUTLINE_HEIGHT_SLACK), lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0));
-        let mut count = 0;
-        let runs =
-            Runs::new(outlines.block_groups, outlines.blocks.len(), |groups| below.may_matter(lanes, groups));
-        for (number, block) in
-            runs.flat_map(|run| outlines.blocks.iter().enumerate().take(run.end).skip(run.start))
-        {
-            let row = |k: usize| lanes.of(&block[k]);
-            let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
-            let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
-            let mut kept = L::F::bits(low.max(other).gt(least));
-            if kept == 0 {
+        let close = lanes.all(SHARED_PLANE_SLACK);
+        let (mut count, mut mattering) = (0, u32::MAX);
+        let groups = outlines.block_groups;
+        let (all, run) =
+            if groups.is_empty() { (1, outlines.blocks.len()) } else { (groups.len() * WIDTH, GROUP) };
+        // loops rather than iterators, which are not inlined into code compiled for another instruction set
+        for group in 0..all {
+            if let (0, Some(bounds)) = (group % WIDTH, groups.get(group / WIDTH)) {
+                mattering = below.may_matter(lanes, bounds);
+            }
+            if mattering >> (group % WIDTH) & 1 == 0 {
                 continue;
             }
-            let first = heights(zero, &corners, [row(6), row(7), row(8), row(9)]);
-            let other = heights(zero, &corners, [row(10), row(11), row(12), row(13)]);
-            let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
-            let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
-            let rim = !L::F::bits(row(15).abs().gt(zero));
-            // a plane that is the same only to rounding rises above itself here and there
-            let mut apart = [zero; 2];
-            for (k, x) in shared.into_iter().enumerate() {
-                apart[0] = apart[0].max((row(6 + k) - lanes.all(x)).abs());
-                apart[1] = apart[1].max((row(10 + k) - lanes.all(x)).abs());
-            }
-            let others = [L::F::bits(apart[0].gt(zero)), L::F::bits(apart[1].gt(zero))];
-            kept &= !same | rim | !others[0] | !others[1];
-            let last = outlines.edges.saturating_sub(number * WIDTH);
-            if last < WIDTH {
-                kept &= (1 << last) - 1;
-            }
-            while kept != 0 {
-                let lane = kept.trailing_zeros() as usize % WIDTH;
-                kept &= kept - 1;
-                let Some(to) = out.get_mut(count / WIDTH) else { return (count, false) };
-                for (to, from) in to.iter_mut().zip(block) {
-                    to[count % WIDTH] = from[lane];
+            for number in group * run..(group + 1) * run {
+                let Some(block) = outlines.blocks.get(number) else { break };
+                let row = |k: usize| lanes.of(&block[k]);
+                let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
+                let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
+                let mut kept = L::F::bits(low.max(other).gt(least));
+                if kept == 0 {
+                    continue;
                 }
-                for (number, _) in others.iter().enumerate().filter(|(_, others)| *others >> lane & 1 == 0) {
-                    to[14 + number][count % WIDTH] = 0.0;
-                    to[16 + number][count % WIDTH] = 0.0;
+                let first = heights(zero, &corners, [row(6), row(7), row(8), row(9)]);
+                let other = heights(zero, &corners, [row(10), row(11), row(12), row(13)]);
+                let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
+                let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
+                let rim = !L::F::bits(row(15).abs().gt(zero));
+                let near =
+                    |(low, top): (L::F, L::F)| L::F::bits(low.gt(zero - close)) & L::F::bits(close.gt(top));
+                let mut own = [near(first) & kept, near(other) & kept];
+                if own[0] | own[1] != 0 {
+                    // a plane that is the same only to rounding rises above itself here and there
+                    for (k, x) in shared.into_iter().enumerate() {
+                        own[0] &= !L::F::bits((row(6 + k) - lanes.all(x)).abs().gt(zero));
+                        own[1] &= !L::F::bits((row(10 + k) - lanes.all(x)).abs().gt(zero));
+                    }
                 }
-                count += 1;
+                kept &= !same | rim | own[0] | own[1];
+                let last = outlines.edges.saturating_sub(number * WIDTH);
+                if last < WIDTH {
+                    kept &= (1 << last) - 1;
+                }
+                while kept != 0 {
+                    let lane = kept.trailing_zeros() as usize % WIDTH;
+                    kept &= kept - 1;
+                    let Some(to) = out.get_mut(count / WIDTH) else { return (count, false) };
+                    for (to, from) in to.iter_mut().zip(block) {
+                        to[count % WIDTH] = from[lane];
+                    }
+                    for (plane, own) in own.into_iter().enumerate() {
+                        if own >> lane & 1 == 1 {
+                            to[14 + plane][count % WIDTH] = 0.0;
+                            to[16 + plane][count % WIDTH] = 0.0;
+                        }
+                    }
+                    count += 1;
+                }
             }
         }
         if let Some(rest) = out.get_mut(count / WIDTH) {

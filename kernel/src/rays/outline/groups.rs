@@ -27,44 +27,6 @@ pub fn count(blocks: usize) -> usize {
     if blocks > GROUP { blocks.div_ceil(GROUP * WIDTH) } else { 0 }
 }
 
-/// Runs of blocks that have to be looked at, in order.
-pub struct Runs<'a, G, F> {
-    groups: &'a [G],
-    blocks: usize,
-    /// Which lanes of the latest bounds are left, and its number.
-    left: u32,
-    next: usize,
-    matters: F,
-}
-
-impl<'a, G, F: Fn(&G) -> u32> Runs<'a, G, F> {
-    /// Of `blocks` blocks, those in groups of which `matters` gives the lane; all where there are no groups.
-    #[inline(always)]
-    pub fn new(groups: &'a [G], blocks: usize, matters: F) -> Self {
-        Runs { groups, blocks, left: 0, next: 0, matters }
-    }
-}
-
-impl<G, F: Fn(&G) -> u32> Iterator for Runs<'_, G, F> {
-    type Item = Range<usize>;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<Range<usize>> {
-        if self.groups.is_empty() {
-            let all = 0..core::mem::take(&mut self.blocks);
-            return (!all.is_empty()).then_some(all);
-        }
-        while self.left == 0 {
-            self.left = (self.matters)(self.groups.get(self.next)?);
-            self.next += 1;
-        }
-        let lane = self.left.trailing_zeros() as usize;
-        self.left &= self.left - 1;
-        let first = ((self.next - 1) * WIDTH + lane) * GROUP;
-        Some(first.min(self.blocks)..(first + GROUP).min(self.blocks))
-    }
-}
-
 /// Fills the bounds of edges, of which there are `edges`.
 pub fn of_edges(blocks: &[Block], edges: usize, out: &mut [EdgeGroups]) {
     for (number, lanes) in out.iter_mut().enumerate() {
