@@ -301,8 +301,8 @@ impl LaneTask for ClusterSky<'_, '_> {
     }
 }
 
-/// Irradiance that the whole sky brings an unknown, one value per band of `out`: of a cluster the mean over 16 of its facets,
-/// one of each part of its area. Returns the variance of that over them, over pi and relative to the reference radiance, in
+/// Irradiance that the whole sky brings an unknown, one value per band of `out`: of a cluster the mean over 16 of its facets
+/// (4 for skies whose irradiance is a quadrature), one of each part of its area. Returns the variance of that over them, over pi and relative to the reference radiance, in
 /// the band where it is largest.
 pub fn whole_sky(
     (scene, elements): (&Scene<'_>, &Elements<'_>),
@@ -319,10 +319,12 @@ pub fn whole_sky(
     let (mut light, mut squares) = ([0.0; MAX_BANDS], [0.0; MAX_BANDS]);
     let light = light.head_mut(out.len());
     out.fill(0.0);
-    const POINTS: usize = QUARTERS * QUARTERS;
+    // skies that are no sums of a few functions take thousands of samples each
+    let depth = if sky.is_linear() { 2 } else { 1 };
+    let points = QUARTERS.pow(depth);
     let mut last = None;
-    for number in 0..POINTS {
-        let (a, b) = place(number, 2);
+    for number in 0..points {
+        let (a, b) = place(number, depth);
         let (facet, ..) = elements.place(unknown / scene.sides().max(1), a, b);
         let normal = scene.side_normal(facet, side);
         if last != Some(normal) {
@@ -330,8 +332,8 @@ pub fn whole_sky(
             last = Some(normal);
         }
         for ((sum, square), x) in out.iter_mut().zip(&mut squares).zip(&*light) {
-            *sum += x / POINTS as f64;
-            *square += x * x / POINTS as f64;
+            *sum += x / points as f64;
+            *square += x * x / points as f64;
         }
     }
     let bands = out.iter().zip(squares).zip(reference).filter(|(_, reference)| **reference > 0.0);

@@ -117,12 +117,13 @@ impl<'a> Solved<'a> {
     }
 
     /// Squared difference of the irradiance over pi that the whole sky brings a facet of a cluster from what it brings the
-    /// cluster's largest, which faces elsewhere, relative to the reference radiance, in the band where that is most.
+    /// cluster's largest, which faces elsewhere, relative to the reference radiance, in the band where that is most; 0 where
+    /// outlines do not tell the straight sky.
     pub(super) fn turned_sky(&self, surface: &Surface, unknown: usize) -> f64 {
         let (Some(sky), true) = (&self.light.sky, self.elements.is_cluster(unknown)) else { return 0.0 };
         let (largest, side) = self.elements.facet_of(unknown);
         let normals = [surface.normal, self.scene.side_normal(largest, side)];
-        if sky.is_uniform() || normals[0] == normals[1] {
+        if !self.straight.knows(unknown) || sky.is_uniform() || normals[0] == normals[1] {
             return 0.0;
         }
         let mut light = [[0.0; MAX_BANDS]; 2];
