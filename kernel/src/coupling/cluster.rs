@@ -19,6 +19,9 @@ const CLUSTERS: f64 = 24.0;
 /// stand for what nothing hides.
 pub const CLUSTERED_FACETS: usize = 8192;
 
+/// Whether facets share elements: not where stack and memory are small.
+pub(crate) const CLUSTERS_MADE: bool = cfg!(feature = "std");
+
 /// Facets over clusters from which on clusters are worth what they leave out.
 const WORTH: f64 = 1.5;
 
@@ -61,7 +64,11 @@ pub struct Clusters<'m> {
 /// Number of clusters wanted of a scene of `facets` facets at a solution's tolerance; 0: its facets stay alone.
 pub fn wanted(facets: usize, tolerance: f64) -> usize {
     let clusters = CLUSTERS / tolerance;
-    if facets > CLUSTERED_FACETS && facets as f64 > WORTH * clusters { clusters as usize } else { 0 }
+    if CLUSTERS_MADE && facets > CLUSTERED_FACETS && facets as f64 > WORTH * clusters {
+        clusters as usize
+    } else {
+        0
+    }
 }
 
 /// Leaves that there is room for: large facets and materials take some beside those that are wanted.
@@ -87,7 +94,7 @@ impl<'m> Clusters<'m> {
         let facets = if clusters == 0 { 0 } else { scene.facets() };
         let order = arena.take::<u32>(facets)?;
         let leaves = arena.take::<Leaf>(room(scene.facets(), clusters))?;
-        if clusters == 0 {
+        if !CLUSTERS_MADE || clusters == 0 {
             return Ok(Clusters::default());
         }
         let largest = area / clusters as f64;

@@ -11,7 +11,7 @@ use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
 use crate::base::quarter::{self, Path, QUARTERS};
-use crate::coupling::cluster::Clusters;
+use crate::coupling::cluster::{CLUSTERS_MADE, Clusters};
 use crate::coupling::subdivide::{Node, SubdivisionTree};
 use crate::scene::Scene;
 use core::ops::Range;
@@ -98,6 +98,8 @@ impl<'m> Elements<'m> {
     }
 
     /// The elements of a cut.
+    // apart, as are the trees: does not burden the stack of probing
+    #[inline(never)]
     pub fn new(
         scene: &Scene<'_>,
         tree: &SubdivisionTree<'_>,
@@ -161,7 +163,7 @@ impl<'m> Elements<'m> {
     /// Clusters, which are the first elements.
     #[inline(always)]
     fn clusters(&self) -> usize {
-        self.groups.shares.len()
+        if CLUSTERS_MADE { self.groups.shares.len() } else { 0 }
     }
 
     /// Whether an unknown's element is a cluster of facets: of its light the mean is known.
@@ -254,8 +256,8 @@ impl<'m> Elements<'m> {
     pub fn share(&self, unknown: usize) -> f64 {
         let element = unknown / self.sides.max(1);
         match self.groups.shares.get(element) {
-            Some(share) => *share,
-            None => Path(self.path.at(element)).share(),
+            Some(share) if CLUSTERS_MADE => *share,
+            _ => Path(self.path.at(element)).share(),
         }
     }
 

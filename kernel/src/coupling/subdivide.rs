@@ -173,6 +173,8 @@ impl<'m> SubdivisionTree<'m> {
     }
 
     /// Every facet whole, and to be probed where it is in none of about `clusters` clusters.
+    // apart: does not burden the stack of probing
+    #[inline(never)]
     pub fn new(
         scene: &Scene<'_>,
         budget: &ErrorBudget,
@@ -228,6 +230,7 @@ impl<'m> SubdivisionTree<'m> {
     /// A triangle's part of the mean square error over the object is a V rho^2 (its share a of the area, unevenness V).
     /// Those with the least stay as they are, as long as their sum is within half of what is left of a small part of
     /// the tolerance's square. Those with detail before them are quartered whatever they count, the largest first.
+    #[inline(never)]
     pub fn refine(&mut self, scene: &Scene<'_>) -> bool {
         let range = self.fresh..self.used;
         let area = |node: &Node| Path(node.path).share() * scene.areas().at(node.facet as usize) / self.area;

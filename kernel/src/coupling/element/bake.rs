@@ -5,6 +5,7 @@ use crate::base::arena::View;
 use crate::base::arena::Writer;
 use crate::base::error::Error;
 use crate::base::index::Index;
+use crate::coupling::cluster::CLUSTERS_MADE;
 use crate::scene::Scene;
 
 impl<'m> Elements<'m> {
@@ -30,6 +31,7 @@ impl<'m> Elements<'m> {
             || nodes > ELEMENT_NODE as usize
             || clusters > elements
             || members > facets
+            || !CLUSTERS_MADE && clusters > 0
         {
             return Err(Error::Block);
         }
