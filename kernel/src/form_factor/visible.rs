@@ -59,7 +59,7 @@ pub fn visible_point_to_polygon<'o>(
     let (normal, distance) = if distance < 0.0 { (-normal, -distance) } else { (normal, distance) };
     let mut list = Pieces { slots: scratch, count: 0 };
     for piece in pieces(polygon) {
-        list.push(&piece.map(|c| c - p).clip(|c| c.dot(n), 0.0))?;
+        list.push_front(&piece, p, n)?;
     }
     for occluder in occluders {
         if list.count == 0 {
@@ -121,12 +121,19 @@ fn visible(
             let height = heights.fold(0.0, f64::max);
             let tolerance = 0.25 * tolerance;
             let mut mean = Mean { normal, size, height, target, occluders, tolerance, scratch };
-            let (parts, count) = cut_along_traces(&receiver, normal, occluders);
-            for patch in parts.iter().take(count).flat_map(|part| patches(part.corners())) {
-                let coarse = mean.over(&patch)?;
-                let part = mean.refined(&patch, coarse)?;
-                value += part.value;
-                error += part.error;
+            if cfg!(feature = "std") {
+                let mut parts = [Convex::EMPTY; RECEIVER_PARTS_MOST];
+                let count = cut_along_traces(&receiver, normal, occluders, &mut parts);
+                for part in parts.iter().take(count) {
+                    mean.add_part(part, &mut value, &mut error)?;
+                }
+                continue;
+            }
+            // where the stack is small, one after the other, each cut anew
+            let (mut at, mut part) = (0, receiver);
+            while at < one_along_traces(&receiver, normal, occluders, at, &mut part) {
+                mean.add_part(&part, &mut value, &mut error)?;
+                at += 1;
             }
         }
     }
@@ -136,16 +143,18 @@ fn visible(
 /// The most parts of a receiver.
 const RECEIVER_PARTS_MOST: usize = if cfg!(feature = "std") { 64 } else { 8 };
 
-/// Cuts a receiver along the lines in which occluders stand on its plane or pass it: what is visible jumps there.
+/// Cuts a receiver into parts along the lines in which occluders stand on its plane or pass it, as what is visible jumps
+/// there. Returns their number.
 #[inline(never)]
 fn cut_along_traces(
     receiver: &Convex,
     normal: Vec3,
     occluders: &[[Vec3; 3]],
-) -> ([Convex; RECEIVER_PARTS_MOST], usize) {
-    let (mut parts, mut count) = ([Convex::EMPTY; RECEIVER_PARTS_MOST], 1);
+    parts: &mut [Convex; RECEIVER_PARTS_MOST],
+) -> usize {
+    let mut count = 1;
     parts.set(0, *receiver);
-    let Some(base) = receiver.corners().first() else { return (parts, 0) };
+    let Some(base) = receiver.corners().first() else { return 0 };
     for occluder in occluders {
         let Some(across) = unit(double_area(occluder)) else { continue };
         let reach = occluder.iter().map(|c| (*c - *base).abs().max_element()).fold(0.0, f64::max);
@@ -174,7 +183,24 @@ fn cut_along_traces(
             count += 1;
         }
     }
-    (parts, count)
+    count
+}
+
+/// One of the parts of [`cut_along_traces`]. Returns their number.
+#[inline(never)]
+fn one_along_traces(
+    receiver: &Convex,
+    normal: Vec3,
+    occluders: &[[Vec3; 3]],
+    at: usize,
+    out: &mut Convex,
+) -> usize {
+    let mut parts = [Convex::EMPTY; RECEIVER_PARTS_MOST];
+    let count = cut_along_traces(receiver, normal, occluders, &mut parts);
+    if let Some(part) = parts.get(at) {
+        *out = *part;
+    }
+    count
 }
 
 /// Corners of occluders that come this near to the receiver's plane stand on it, as a share of the distance: coordinates
@@ -189,6 +215,7 @@ struct Shadow {
 impl Shadow {
     /// The shadow of a triangle, seen from the origin, on the plane normal . x = distance, distance >= 0; none
     /// where it is seen edge-on or lies beyond that plane.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn new(triangle: &[Vec3; 3], normal: Vec3, distance: f64) -> Option<Shadow> {
         let reach = sqrt(triangle.iter().fold(0.0, |m: f64, c| m.max(c.length_squared())));
         let tolerance = HEIGHT_ROUNDING * reach.max(distance);
@@ -219,7 +246,14 @@ struct Pieces<'s> {
 }
 
 impl Pieces<'_> {
+    /// Appends what of a piece is before the plane of a point, seen from there.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn push_front(&mut self, piece: &Convex, p: Vec3, n: Vec3) -> Result<(), Error> {
+        self.push(&piece.map(|c| c - p).clip(|c| c.dot(n), 0.0))
+    }
+
     /// Appends a piece, in two where it has many corners; one without area is left out.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn push(&mut self, piece: &Convex) -> Result<(), Error> {
         let corners = piece.corners();
         let middle = corners.len() / 2;
@@ -251,6 +285,7 @@ impl Pieces<'_> {
     }
 
     /// Takes a shadow out of all pieces.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn subtract(&mut self, shadow: &Shadow) -> Result<(), Error> {
         let mut index = 0;
         let mut untouched = self.count;
@@ -293,7 +328,20 @@ struct Mean<'m> {
 }
 
 impl Mean<'_> {
+    /// Adds a part's of the mean, and its error.
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    fn add_part(&mut self, part: &Convex, value: &mut f64, error: &mut f64) -> Result<(), Error> {
+        for patch in patches(part.corners()) {
+            let coarse = self.over(&patch)?;
+            let part = self.refined(&patch, coarse)?;
+            *value += part.value;
+            *error += part.error;
+        }
+        Ok(())
+    }
+
     /// A patch's part of the mean, by one rule.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn over(&mut self, patch: &Patch) -> Result<f64, Error> {
         let mut sum = 0.0;
         for (p, area) in patch.nodes(self.normal, GAUSS_3) {
@@ -308,6 +356,7 @@ impl Mean<'_> {
     /// The patches that a shadow's outline bends lie along it, and are as many as it is longer than they are:
     /// each may differ by the tolerance times its own length's share. Along an outline the difference falls by
     /// 2.8 a halving and is shared by two: less than a quarter of the parent's is taken for chance.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn refined(&mut self, whole: &Patch, coarse: f64) -> Result<Estimate, Error> {
         let mut halvings = [Halving::default(); RECEIVER_HALVINGS_MOST as usize];
         let (mut path, mut patch, mut coarse, mut parent) =
