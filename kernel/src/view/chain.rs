@@ -523,10 +523,13 @@ impl Solved<'_> {
             path.object |= state.mirrors == 0;
             state.far += met.t;
             state.step = met.t;
-            let surface = Surface::of_hit(self.scene, &met)?;
-            self.add_diffuse(state, &surface, mode, terms, path);
-            let mirror = surface.mirror(self.scene)?;
-            if !self.advance(state, &surface, terms, path) {
+            // where they stand: copies burden small stacks
+            let surface = &Surface::of_hit(self.scene, &met);
+            let surface = surface.as_ref()?;
+            self.add_diffuse(state, surface, mode, terms, path);
+            let mirror = &surface.mirror(self.scene);
+            let mirror = mirror.as_ref()?;
+            if !self.advance(state, surface, terms, path) {
                 return None;
             }
             // where sunlight is found apart, the first mirror's is
@@ -536,16 +539,16 @@ impl Solved<'_> {
             hit = match &mirror.lobe {
                 None => {
                     if apart {
-                        let imaged = !self.images.slots.is_empty() && self.knows_images(&surface);
+                        let imaged = !self.images.slots.is_empty() && self.knows_images(surface);
                         (state.lobe, state.imaged) = (true, imaged);
                     }
-                    self.advance_mirror(state, &surface, mode, path)
+                    self.advance_mirror(state, surface, mode, path)
                 }
                 Some(lobe) => {
                     if !(apart && lobe.ratio() >= NARROW_LOBE_RATIO) {
-                        self.add_sun_gloss(state, &surface, &mirror, mode, terms, path);
+                        self.add_sun_gloss(state, surface, mirror, mode, terms, path);
                     }
-                    if !self.advance_lobe(state, &surface, &mirror, mode, path) {
+                    if !self.advance_lobe(state, surface, mirror, mode, path) {
                         return Some(met);
                     }
                     path.rays += 1;
@@ -588,7 +591,8 @@ impl Solved<'_> {
 
     /// Reflects the ray at an ideal mirror and finds what it meets: among the facets that are known to stand in its way,
     /// where they are known, as for parallel rays.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn advance_mirror(
         &self,
         state: &mut PathState<'_>,
@@ -670,7 +674,7 @@ impl Solved<'_> {
         path: &mut Path,
         samples: &mut LobeSamples<'w>,
     ) {
-        let Some(surface) = Surface::of_hit(self.scene, hit) else { return };
+        let Some(surface) = &Surface::of_hit(self.scene, hit) else { return };
         let Some(lobe) = surface.mirror(self.scene).and_then(|mirror| mirror.lobe) else { return };
         let bands = self.shape.bands;
         let mirrored = surface.mirrored(self.scene, state.ray.direction);
@@ -687,7 +691,8 @@ impl Solved<'_> {
             let turn = mode.sample.turn(set);
             for i in 0..n {
                 let direction = lobe.ray(i as usize, n as usize, turn, mirrored, surface.normal);
-                self.add_ray(state, surface.spawn_ray(direction), mode, samples);
+                state.ray = surface.spawn_ray(direction);
+                self.add_ray(state, mode, samples);
             }
             if asked.is_none() {
                 goal = self.all_rays(samples.spread(self.reference), samples.path.glare);
@@ -711,15 +716,9 @@ impl Solved<'_> {
         wanted.min(MOST_LOBE_RAYS) as u32
     }
 
-    /// One more ray of the lobe that `state` has met, to its end. Its state is lent to the ray, as the stack has room for
+    /// One more ray of the lobe that `state` has met, its ray, to its end. Its state is lent to the ray, as the stack has room for
     /// one alone, and given back but for its own ray.
-    fn add_ray<'w>(
-        &self,
-        state: &mut PathState<'w>,
-        ray: Ray,
-        mode: &mut Mode<'_, '_>,
-        samples: &mut LobeSamples<'w>,
-    ) {
+    fn add_ray<'w>(&self, state: &mut PathState<'w>, mode: &mut Mode<'_, '_>, samples: &mut LobeSamples<'w>) {
         let bands = self.shape.bands;
         samples.before.iter_mut().enumerate().take(bands).for_each(|(b, x)| *x = samples.terms.sum(b));
         copy(samples.throughput.head_mut(bands), state.throughput.head(bands));
@@ -727,10 +726,10 @@ impl Solved<'_> {
         let sample = RaySample::Stratum { seed: mode.sample.seed(), index: samples.count };
         let importance = mode.importance.as_deref_mut();
         let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false, importance };
-        let hit = self.bvh.closest(&ray);
+        let hit = self.bvh.closest(&state.ray);
         let PathState { mirrors, lobes, far, imaged, .. } = *state;
         let gathered = state.gathered.take();
-        (state.ray, state.lobe) = (ray, true);
+        state.lobe = true;
         core::mem::swap(&mut state.throughput, &mut samples.throughput);
         self.follow(state, hit, &mut mode, samples.terms, &mut samples.path);
         core::mem::swap(&mut state.throughput, &mut samples.throughput);
@@ -779,7 +778,9 @@ impl Solved<'_> {
     }
 
     /// Adds the diffuse radiance of a facet toward the chain, times the throughput: emission, and what arrives at the point.
-    #[inline]
+    // apart on small machines: does not burden the stack of highlights
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn add_diffuse(
         &self,
         state: &mut PathState<'_>,

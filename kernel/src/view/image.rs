@@ -166,13 +166,34 @@ pub fn rows(
     target: &mut Target<'_>,
     scratch: &mut [u8],
 ) -> Result<Tally, Error> {
+    let mut solved = *solved;
+    prepare(&mut solved, camera);
+    prepared_rows(&solved, camera, range, target, scratch)
+}
+
+/// Gives a solved scene the settings that the images of a camera need.
+#[inline(never)]
+pub fn prepare(solved: &mut Solved<'_>, camera: &Camera) {
+    solved.settings = solved.settings.of_image(camera, solved);
+}
+
+/// [`rows`] of a scene that [`prepare`] made ready for the camera.
+// without a copy of the scene, which burdens small stacks
+#[inline]
+pub fn prepared_rows(
+    solved: &Solved<'_>,
+    camera: &Camera,
+    range: Range<usize>,
+    target: &mut Target<'_>,
+    scratch: &mut [u8],
+) -> Result<Tally, Error> {
     if range.start > range.end || range.end > camera.rows() {
         return Err(Error::Range { field: Field::Rows, band: 0, value: range.end as f64 });
     }
     check(target, range.len() * camera.columns() * solved.shape.bands)?;
-    let settings = solved.settings.of_image(camera, solved);
-    let solved = &Solved { settings, ..*solved };
-    let mut painter = Painter::new(solved, camera, range.end, scratch)?;
+    // in one place of the stack: it is large
+    let mut painter = Painter::new(solved, camera, range.end, scratch);
+    let painter = painter.as_mut().map_err(|error| *error)?;
     if camera.is_parallel() {
         painter.look_beside();
     }
@@ -262,6 +283,8 @@ struct Painter<'a, 's> {
 
 impl<'a, 's> Painter<'a, 's> {
     /// In scratch memory of [`scratch_bytes`]; rows from `end` on are not wanted.
+    // apart on small machines: does not burden the stack of rays
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn new(
         solved: &'a Solved<'a>,
         camera: &'a Camera,

@@ -217,6 +217,7 @@ pub fn whole<'s>(solved: &Solved<'_>, view: &View, scratch: &'s mut [u8]) -> Res
 }
 
 /// The same bits, and what the radiant intensity is made of and depends on, added to `importance`, which is all zero before.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
 pub fn explained<'s>(
     solved: &Solved<'_>,
     view: &View,
@@ -292,9 +293,9 @@ impl Tracer<'_> {
     fn glints(&mut self, row: usize, sums: &mut Sums) {
         let Tracer { solved, view, work, importance, .. } = self;
         let whole = self.area * (view.cells * view.cells) as f64;
-        let products = &mut work.images;
+        let (products, shown) = (&mut work.images, &mut work.before);
         let importance = importance.as_mut();
-        Glints { solved, forward: view.samples.forward, whole, products, importance }.row(row, sums);
+        Glints { solved, forward: view.samples.forward, whole, products, shown, importance }.row(row, sums);
     }
 
     /// Adds one ray in each cell of a row.

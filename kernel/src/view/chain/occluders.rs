@@ -6,6 +6,7 @@ use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
 use crate::radiosity::sun_image::{Image, Nearby, SUN_DISTANCE_LEAST};
+use crate::rays::bvh::HalfSpace;
 use crate::rays::outline::Candidates;
 use crate::rays::surface::Surface;
 use crate::rays::swept::{SWEPT_MARGIN, swept};
@@ -220,11 +221,24 @@ impl Occluders {
         let corners = solved.scene.corners().at(surface.facet);
         let normal = surface.normal;
         let Some(halves) = swept(&corners, normal, direction, spread) else { return };
+        self.collect_within(solved, surface, direction, &halves);
+    }
+
+    /// Notes what reaches into a region.
+    // apart on small machines: does not burden the stack of finding the region
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn collect_within(
+        &mut self,
+        solved: &Solved<'_>,
+        surface: &Surface,
+        direction: Vec3,
+        halves: &[HalfSpace; 4],
+    ) {
         let (mut count, own) = (0, surface.facet as u32);
         // of what is in the way to an image of the sun, the mirrors that may show it count
         let image = self.kind >= RayKind::Image(0).number();
         let facets = &mut self.facets;
-        solved.bvh.within(&halves, |facet| {
+        solved.bvh.within(halves, |facet| {
             if facet == own || image && !solved.shows_sun(facet as usize, direction) {
                 return true;
             }

@@ -7,6 +7,7 @@ use crate::base::math::{FRAC_1_PI, Vec3, clamp, pow, reflect, sqrt};
 use crate::base::qmc::{Sequence, hash2};
 use crate::coupling::mirror_path::MIRRORS_MOST;
 use crate::radiosity::sun_image::{Image, SUN_DISTANCE_LEAST};
+use crate::rays::ray::{Hit, Ray};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::MAX_BANDS;
 use crate::scene::lobe::{Highlight, Lobe};
@@ -242,31 +243,47 @@ impl Solved<'_> {
             let Some(hit) = self.bvh.closest(&ray) else {
                 return mirrors > 0 && 1.0 - axis.dot(sun.direction()) < SUN_DISTANCE_LEAST;
             };
-            let Some(surface) = Surface::of_hit(self.scene, &hit) else { return false };
-            let Some(normal) = surface.flat_mirror(self.scene).filter(|_| mirrors < most) else {
-                return false;
-            };
-            let mut largest = 0.0;
-            for (product, rho) in products.iter_mut().zip(self.scene.specular(surface.material)) {
-                *product *= rho;
-                largest = f64::max(largest, *product);
-            }
-            // as far as beams are traced
-            if largest < self.settings.budget.beam_chains || mirrors as usize >= MIRRORS_MOST {
+            if mirrors >= most || !self.mirrors_on(sun, &hit, mirrors, (&mut ray, &mut axis), products) {
                 return false;
             }
             mirrors += 1;
-            axis = reflect(axis, normal);
-            let (sides, side) =
-                (self.elements.facet_sides(), self.elements.kept_side(surface.facet, surface.side));
-            if 1.0 - axis.dot(sun.direction()) >= SUN_DISTANCE_LEAST
-                && !self.images.may_show(sides, side, axis)
-            {
-                // what this mirror shows is no image of the sun
-                return false;
-            }
-            ray = surface.spawn_ray(surface.mirrored(self.scene, ray.direction));
         }
+    }
+
+    /// Mirrors a ray that looks for the sun, after so few mirrors that more may follow, where it meets a mirror that may show
+    /// it: the ray, the direction in which the sun seems to stand, and the product of the reflectances.
+    // apart on small machines: does not burden the stack of the search
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline(always))]
+    fn mirrors_on(
+        &self,
+        sun: &Sun<'_>,
+        hit: &Hit,
+        mirrors: u32,
+        (ray, axis): (&mut Ray, &mut Vec3),
+        products: &mut [f64; MAX_BANDS],
+    ) -> bool {
+        let Some(surface) = &Surface::of_hit(self.scene, hit) else { return false };
+        let Some(normal) = surface.flat_mirror(self.scene) else { return false };
+        let mut largest = 0.0;
+        for (product, rho) in products.iter_mut().zip(self.scene.specular(surface.material)) {
+            *product *= rho;
+            largest = f64::max(largest, *product);
+        }
+        // as far as beams are traced
+        if largest < self.settings.budget.beam_chains || mirrors as usize >= MIRRORS_MOST {
+            return false;
+        }
+        *axis = reflect(*axis, normal);
+        let (sides, side) =
+            (self.elements.facet_sides(), self.elements.kept_side(surface.facet, surface.side));
+        if 1.0 - axis.dot(sun.direction()) >= SUN_DISTANCE_LEAST && !self.images.may_show(sides, side, *axis)
+        {
+            // what this mirror shows is no image of the sun
+            return false;
+        }
+        *ray = surface.spawn_ray(surface.mirrored(self.scene, ray.direction));
+        true
     }
 
     /// The sun and its images in a lobe, evaluated directly: E q(sun, view) V, the mean over the disc.
@@ -283,22 +300,26 @@ impl Solved<'_> {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
         let mirrored = surface.mirrored(self.scene, state.ray.direction);
         let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
-        let bands = self.shape.bands;
         if shows(sun) {
-            let known =
-                mode.occluders.before(self, surface, RayKind::Sun, (sun.direction(), sun.half_angle()));
-            let [lit, _] = &mut *state.images;
-            lit.head_mut(bands).fill(0.0);
-            let (disc, value) = Disc::of_lobe(lobe, mirrored, sun);
-            let at_stake = value * self.gloss_at_stake(state.throughput, sun);
-            let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
-                let seen = toward.dot(surface.normal) > 0.0 && self.sees_sun(surface, toward, known, path);
-                lit.head_mut(bands).iter_mut().for_each(|sum| *sum += if seen { share } else { 0.0 });
-                seen
-            });
-            self.add_highlight(state, (sun, value, all), terms);
-            self.glare(state, lobe, value, at_stake, path);
+            self.add_straight_gloss(state, surface, (sun, lobe, mirrored), mode, terms, path);
         }
+        self.add_image_gloss(state, surface, (sun, lobe, mirrored), mode, terms, path);
+    }
+
+    /// The sun's images in a lobe about the direction `mirrored`.
+    // apart on small machines, as is the sun itself: neither burdens the stack of the other
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn add_image_gloss(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        (sun, lobe, mirrored): (&Sun<'_>, &Lobe, Vec3),
+        mode: &mut Mode<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
+        let bands = self.shape.bands;
+        let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
         let mut images = mode.occluders.images(self, surface, sun.half_angle());
         while let Some(one) = images.next(mode.occluders) {
@@ -325,6 +346,33 @@ impl Solved<'_> {
             self.add_highlight(state, (sun, value, all), terms);
             self.glare(state, lobe, value, at_stake, path);
         }
+    }
+
+    /// The sun itself in a lobe about the direction `mirrored`.
+    // apart on small machines: does not burden the stack of images
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn add_straight_gloss(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        (sun, lobe, mirrored): (&Sun<'_>, &Lobe, Vec3),
+        mode: &mut Mode<'_, '_>,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
+        let bands = self.shape.bands;
+        let known = mode.occluders.before(self, surface, RayKind::Sun, (sun.direction(), sun.half_angle()));
+        let [lit, _] = &mut *state.images;
+        lit.head_mut(bands).fill(0.0);
+        let (disc, value) = Disc::of_lobe(lobe, mirrored, sun);
+        let at_stake = value * self.gloss_at_stake(state.throughput, sun);
+        let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
+            let seen = toward.dot(surface.normal) > 0.0 && self.sees_sun(surface, toward, known, path);
+            lit.head_mut(bands).iter_mut().for_each(|sum| *sum += if seen { share } else { 0.0 });
+            seen
+        });
+        self.add_highlight(state, (sun, value, all), terms);
+        self.glare(state, lobe, value, at_stake, path);
     }
 
     /// Notes a highlight that other rays of a lobe may meet nearer to its middle. Directions in which it is brighter than
@@ -397,7 +445,8 @@ impl<'a> Disc<'a> {
     }
 
     /// A direction for a point of the unit square, and its share; 0 or more.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn sample(&self, u: f64, v: f64) -> (Vec3, f64) {
         match self {
             Disc::OnPlane(sun, normal) => {

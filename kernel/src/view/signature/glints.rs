@@ -22,9 +22,6 @@ pub(super) const GLINT_FACETS: usize = 64;
 /// Most halvings of a facet's sides.
 const GLINT_HALVINGS_MOST: u32 = 9;
 
-/// Most parts of a facet that wait: three of each halving, and one.
-const GLINT_PARTS_WAITING: usize = 3 * GLINT_HALVINGS_MOST as usize + 1;
-
 /// Largest bend of the mirrored direction over a part of a facet, in half angles of the disc, at which the part counts
 /// as linear: its glint is off by about this share.
 const GLINT_BEND_MOST: f64 = 0.004;
@@ -78,11 +75,17 @@ impl Part {
         1.0 / (1u64 << (2 * self.depth)) as f64
     }
 
-    /// Its four quarters.
-    fn quarters(&self) -> [Part; 4] {
+    /// One of its four quarters.
+    fn quarter(&self, number: u32) -> Part {
         let [a, b, c] = self.corners;
         let (p, q, r) = (self.at(0.5, 0.0), self.at(0.5, 0.5), self.at(0.0, 0.5));
-        [[a, p, r], [p, b, q], [r, q, c], [q, r, p]].map(|corners| Part { corners, depth: self.depth + 1 })
+        let corners = match number {
+            0 => [a, p, r],
+            1 => [p, b, q],
+            2 => [r, q, c],
+            _ => [q, r, p],
+        };
+        Part { corners, depth: self.depth + 1 }
     }
 }
 
@@ -95,6 +98,8 @@ pub(super) struct Glints<'a, 'w, 'm> {
     pub whole: f64,
     /// Products of the reflectances on the way to an image, and sums of what is seen of it.
     pub products: &'w mut [[f64; MAX_BANDS]; 2],
+    /// What a facet adds.
+    pub shown: &'w mut [f64; MAX_BANDS],
     /// Where facets' shares are noted.
     pub importance: Option<&'w mut Importance<'m>>,
 }
@@ -137,12 +142,11 @@ impl Glints<'_, '_, '_> {
     // apart: it does not burden the stack of all else
     #[inline(never)]
     fn noted(&mut self, facet: usize, side: usize, area: f64, sums: &mut Sums) {
-        let before = sums.intensity;
+        *self.shown = sums.intensity;
         self.facet(facet, side, area, sums);
         if let Some(importance) = self.importance.as_deref_mut() {
-            let mut shown = sums.intensity;
-            shown.iter_mut().zip(before).for_each(|(shown, before)| *shown -= before);
-            importance.add_glints(facet, &shown);
+            self.shown.iter_mut().zip(&sums.intensity).for_each(|(before, after)| *before = after - *before);
+            importance.add_glints(facet, self.shown);
         }
     }
 
@@ -169,6 +173,12 @@ impl Glints<'_, '_, '_> {
     }
 
     /// The direction that a point of a facet mirrors toward the observer.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn toward(&self, seen: &Seen<'_>, at: (f64, f64)) -> Vec3 {
+        self.mirrored(seen, at).1
+    }
+
+    /// A point of a facet, and the direction that it mirrors toward the observer.
     fn mirrored(&self, seen: &Seen<'_>, (u, v): (f64, f64)) -> (Surface, Vec3) {
         let surface = Surface::new(self.solved.scene, seen.facet, seen.side, u, v);
         let mirrored = surface.mirrored(self.solved.scene, self.forward);
@@ -181,30 +191,36 @@ impl Glints<'_, '_, '_> {
         mut halves: impl FnMut(&mut Self, &Part) -> Option<bool>,
         mut leaf: impl FnMut(&mut Self, &Part),
     ) {
-        let facet = Part { corners: [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth: 0 };
-        let (mut waiting, mut count) = ([facet; GLINT_PARTS_WAITING], 1);
-        while count > 0 {
-            count -= 1;
-            let Some(&part) = waiting.get(count) else { return };
+        let mut part = Part { corners: [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth: 0 };
+        // each with the number of its quarters that wait
+        let (mut halved, mut count) = ([(part, 0); GLINT_HALVINGS_MOST as usize], 0);
+        loop {
             match halves(self, &part) {
                 None => {}
                 Some(true) if part.depth < GLINT_HALVINGS_MOST => {
-                    for quarter in part.quarters() {
-                        waiting.set(count, quarter);
-                        count += 1;
-                    }
+                    halved.set(count, (part, 4));
+                    count += 1;
                 }
                 Some(_) => leaf(self, &part),
             }
+            while count > 0 && halved.get(count - 1).is_some_and(|(_, waiting)| *waiting == 0) {
+                count -= 1;
+            }
+            let Some((whole, waiting)) = count.checked_sub(1).and_then(|last| halved.get_mut(last)) else {
+                return;
+            };
+            *waiting -= 1;
+            part = whole.quarter(*waiting);
         }
     }
 
     /// The sun's disc in an ideal mirror.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn glint(&mut self, seen: &Seen<'_>, sums: &mut Sums) {
         let (axis, radius) = (seen.sun.direction(), sin(seen.sun.half_angle()));
         let halves = |this: &mut Self, part: &Part| {
-            let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
-            let middle = this.mirrored(seen, part.at(1.0 / 3.0, 1.0 / 3.0)).1;
+            let ends = part.corners.map(|corner| this.toward(seen, corner));
+            let middle = this.toward(seen, part.at(1.0 / 3.0, 1.0 / 3.0));
             let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
             let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
             // half as far again: the direction bends
@@ -219,24 +235,17 @@ impl Glints<'_, '_, '_> {
         let (first, second) = frame(axis);
         self.parts(halves, |this, part| {
             let ends = part.corners.map(|corner| {
-                let mirrored = this.mirrored(seen, corner).1;
+                let mirrored = this.toward(seen, corner);
                 (mirrored.dot(first) / radius, mirrored.dot(second) / radius)
             });
-            let radiance = core::array::from_fn(|band| seen.sun.disc_radiance(band));
-            this.lines(seen, part, ends, &radiance, sums);
+            this.lines(seen, part, ends, sums);
         });
     }
 
     /// Adds the glint of a part on which the mirrored direction is linear: `ends` are those of its corners, in half widths
     /// of the disc from its middle.
-    fn lines(
-        &mut self,
-        seen: &Seen<'_>,
-        part: &Part,
-        [a, b, c]: [(f64, f64); 3],
-        radiance: &[f64; MAX_BANDS],
-        sums: &mut Sums,
-    ) {
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn lines(&mut self, seen: &Seen<'_>, part: &Part, [a, b, c]: [(f64, f64); 3], sums: &mut Sums) {
         let bands = self.solved.shape.bands;
         let sequence = Sequence::new(hash2(seen.facet as u32, part.depth));
         let mut lines = GLINT_LINES;
@@ -265,12 +274,13 @@ impl Glints<'_, '_, '_> {
                 continue;
             }
             let off = if partly { sqrt(lit * (all - lit)) * pow(f64::from(lines), -0.75) } else { 0.0 };
-            self.add(seen, part.share(), (radiance, off), sums);
+            self.add(seen, part.share(), (|band| seen.sun.disc_radiance(band), off), sums);
             return;
         }
     }
 
     /// The sun in a lobe.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn highlight(&mut self, seen: &Seen<'_>, lobe: &Lobe, sums: &mut Sums) {
         let (axis, solved) = (seen.sun.direction(), self.solved);
         let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
@@ -278,8 +288,8 @@ impl Glints<'_, '_, '_> {
         let faint = GLINT_FAINT * solved.settings.budget.image * self.whole;
         let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
         let halves = |this: &mut Self, part: &Part| {
-            let ends = part.corners.map(|corner| this.mirrored(seen, corner).1);
-            let middle = this.mirrored(seen, part.at(1.0 / 3.0, 1.0 / 3.0)).1;
+            let ends = part.corners.map(|corner| this.toward(seen, corner));
+            let middle = this.toward(seen, part.at(1.0 / 3.0, 1.0 / 3.0));
             let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
             let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
             let nearest = (off - 1.5 * reach).max(0.0);
@@ -291,6 +301,7 @@ impl Glints<'_, '_, '_> {
     }
 
     /// Adds what a small part shows of the sun in a lobe, by points of it.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn points(&mut self, seen: &Seen<'_>, lobe: &Lobe, part: &Part, scale: f64, faint: f64, sums: &mut Sums) {
         let bands = self.solved.shape.bands;
         let sequence = Sequence::new(hash2(seen.facet as u32, 0x5000 + part.depth));
@@ -300,9 +311,11 @@ impl Glints<'_, '_, '_> {
             let [u, v] = QUADRATIC_POINTS.at(count as usize % QUADRATIC_POINTS.len());
             let (surface, mirrored) = self.mirrored(seen, part.at(u, v));
             let highlight = Highlight::new(lobe, mirrored, &seen.sun);
-            let value = highlight.map_or_else(|| lobe.value(mirrored.dot(seen.sun.direction())), |h| h.value);
             let (x, y) = sequence.pair(count, 2);
-            let toward = highlight.map_or_else(|| seen.sun.sample(x, y), |h| h.sample(x, y));
+            let (value, toward) = match &highlight {
+                Some(highlight) => (highlight.value, highlight.sample(x, y)),
+                None => (lobe.value(mirrored.dot(seen.sun.direction())), seen.sun.sample(x, y)),
+            };
             all += value;
             if value > 0.0 && self.is_lit(seen, &surface, toward, sums) {
                 lit += value;
@@ -318,8 +331,7 @@ impl Glints<'_, '_, '_> {
         let share = 1.0 / f64::from(count);
         self.products[1].head_mut(bands).iter_mut().for_each(|sum| *sum *= share);
         let off = if lit > 0.0 && lit < all { sqrt(lit * (all - lit)) * pow(share, 1.5) } else { 0.0 };
-        let irradiance = core::array::from_fn(|band| seen.sun.irradiance(band));
-        self.add(seen, part.share(), (&irradiance, off), sums);
+        self.add(seen, part.share(), (|band| seen.sun.irradiance(band), off), sums);
     }
 
     /// What a lobe's value of 1 brings, the most over the bands relative to the reference radiance.
@@ -354,11 +366,11 @@ impl Glints<'_, '_, '_> {
         lit
     }
 
-    /// Adds a part's light, whose sums are known; `off` is what its share is expected to be wrong by.
-    fn add(&self, seen: &Seen<'_>, share: f64, (light, off): (&[f64; MAX_BANDS], f64), sums: &mut Sums) {
+    /// Adds a part's `light`, by band, whose sums are known; `off` is what its share is expected to be wrong by.
+    fn add(&self, seen: &Seen<'_>, share: f64, (light, off): (impl Fn(usize) -> f64, f64), sums: &mut Sums) {
         let specular = self.solved.scene.specular(self.solved.scene.material(seen.facet));
         for (band, rho) in specular.iter().enumerate() {
-            let each = seen.area * share * rho * light.at(band);
+            let each = seen.area * share * rho * light(band);
             let value = sums.intensity.at(band) + each * self.products[1].at(band);
             sums.intensity.set(band, value);
             let doubt = sums.doubt2.at(band) + (each * off) * (each * off);
