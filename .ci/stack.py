@@ -36,7 +36,7 @@ RULES = [
     ),
     (r"^<?blik::intersector::Caller\b", ""),
     # a function of progress
-    (r"^blik::explain::blik_explain::", ""),
+    (r"^(blik::explain::blik_explain::|blik_kernel::stages::lights::explain_view$)", ""),
     # rays of a series, and who traces them
     (
         r"^blik_kernel::rays::bvh::external::\w+::answer$",

@@ -9,10 +9,10 @@ use crate::status::*;
 use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::bake::{self, Baked};
 use blik_kernel::coupling::Block;
-use blik_kernel::light::LightInput;
+use blik_kernel::light::{Light, LightInput};
 use blik_kernel::simd::Isa;
 use core::ffi::c_void;
-use core::ptr::null_mut;
+use core::ptr::{NonNull, null_mut};
 
 /// Boundary, in bytes, on which a baked block starts.
 pub const BLIK_BLOCK_ALIGNMENT: usize = 64;
@@ -164,6 +164,36 @@ fn block_table(memory: &'static mut [u8], parts: usize) -> &'static mut [Block<'
     unsafe { core::slice::from_raw_parts_mut(table, parts) }
 }
 
+/// Makes the handles over a block, under the light of its solution; returns the solution's, null where it has none.
+///
+/// # Safety
+/// There is room for each, for as long as the block is there.
+// apart: handles being made do not burden the stack of checking the block
+#[inline(never)]
+unsafe fn make_handles(
+    baked: &Baked<'static>,
+    light: Option<&Light<'static>>,
+    (scene_at, coupling_at, solution_at): (
+        NonNull<blik_scene>,
+        NonNull<blik_coupling>,
+        NonNull<blik_solution>,
+    ),
+) -> *mut blik_solution {
+    let settings = Settings { asked: baked.settings, fit: false };
+    // SAFETY: by the caller's promise.
+    unsafe {
+        scene_at.write(blik_scene::new(baked.scene, baked.bvh));
+        let base: &'static blik_scene = &*scene_at.as_ptr();
+        coupling_at.write(blik_coupling::new(base, baked.elements, baked.blocks, settings));
+        let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
+        let (Some(own), Some(light)) = (&baked.solution, light) else { return null_mut() };
+        let (record, emission) = (own.record, own.emission);
+        let input = LightInput { sky: own.sky, sun: own.sun, emission, reference: None };
+        solution_at.write(blik_solution::new(coupled, *light, input, record, record.memory()));
+        solution_at.as_ptr()
+    }
+}
+
 /// Checks a block from end to end and makes handles over it. A block that is damaged or hostile is refused by
 /// `BLIK_ERROR_BLOCK`.
 ///
@@ -203,25 +233,20 @@ pub unsafe extern "C" fn blik_load(
         let (coupling_at, rest) = place::<blik_coupling>(rest)?;
         let (solution_at, rest) = place::<blik_solution>(rest)?;
         let table = block_table(rest, parts);
-        let baked = Baked::load(block, Isa::detect(), table)?;
-        let lit = match &baked.solution {
-            Some(solution) => Some((*solution, solution.light(&baked.scene)?)),
+        // in one place of the stack each: they are large
+        let baked = Baked::load(block, Isa::detect(), table);
+        let baked = baked.as_ref().map_err(|error| *error)?;
+        let light = match &baked.solution {
+            Some(solution) => Some(&solution.light(&baked.scene)),
             None => None,
         };
-        let settings = Settings { asked: baked.settings, fit: false };
+        let light = match light {
+            Some(light) => Some(light.as_ref().map_err(|error| *error)?),
+            None => None,
+        };
         // SAFETY: `place` made room for each; the handles live as long as the caller's memory.
         unsafe {
-            scene_at.write(blik_scene::new(baked.scene, baked.bvh));
-            let base: &'static blik_scene = &*scene_at.as_ptr();
-            coupling_at.write(blik_coupling::new(base, baked.elements, baked.blocks, settings));
-            let coupled: &'static blik_coupling = &*coupling_at.as_ptr();
-            let mut solved = null_mut();
-            if let Some((own, light)) = lit {
-                let (record, emission) = (own.record, own.emission);
-                let input = LightInput { sky: own.sky, sun: own.sun, emission, reference: None };
-                solution_at.write(blik_solution::new(coupled, light, input, record, record.memory()));
-                solved = solution_at.as_ptr();
-            }
+            let solved = make_handles(baked, light, (scene_at, coupling_at, solution_at));
             to_scene.write(scene_at.as_ptr());
             to_coupling.write(coupling_at.as_ptr());
             to_solution.write(solved);

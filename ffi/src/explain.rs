@@ -13,6 +13,7 @@ use blik_kernel::Error;
 use blik_kernel::importance::TERMS;
 use blik_kernel::math::Vec3;
 use blik_kernel::scene::MAX_BANDS;
+use blik_kernel::stages::Explained;
 use core::ffi::c_void;
 
 /// Bytes of scratch memory for [`blik_explain`]. More is for scenes with mirrors that scatter sunlight.
@@ -100,11 +101,14 @@ pub unsafe extern "C" fn blik_explain(
 ) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let (coupling, given, runner) = unsafe {
+        let (coupling, given) = unsafe {
             let coupling: &blik_coupling = object(coupling)?;
-            let given = given_light(light, &coupling.base.scene)?;
-            (coupling, given, crate::run::Runner::new(run)?)
+            (coupling, &given_light(light, &coupling.base.scene))
         };
+        // lights in one place of the stack each: they are large
+        let given = given.as_ref().map_err(|error| *error)?;
+        // SAFETY: by the caller's promise.
+        let runner = unsafe { crate::run::Runner::new(run) }?;
         let scene = &coupling.base.scene;
         let (too_many, views, bands) = (blik_error::of(BLIK_ERROR_TOO_MANY), direction_count, scene.bands());
         let facets = scene.facets() * bands;
@@ -127,26 +131,19 @@ pub unsafe extern "C" fn blik_explain(
         let cells = wanted_cells(cells, coupling)?;
         let matrix = coupling.matrix()?;
         let all = coupled(coupling, &matrix);
-        let light = given.light(scene)?;
+        let light = given.light(scene);
+        let light = light.as_ref().map_err(|error| *error)?;
         let chains = coupling.settings.asked.chains(coupling.rays);
-        let wanted = all.explain_bytes(&light)?;
+        let wanted = all.explain_bytes(light)?;
         let work = |memory: &mut [u8]| {
             if memory.len() < wanted {
                 return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(wanted, memory.len()));
             }
             all.start(memory)?;
             let (mut number, views) = (0, (directions.as_chunks::<3>().0, cells));
-            let done = all.explain((&given, &light), None, views, chains, memory, |_, found| {
+            let done = all.explain((given, light), None, views, chains, memory, |_, found| {
                 let forward = Vec3::from_array(views.0.get(number).copied().unwrap_or_default());
-                let mut background = [0.0; MAX_BANDS];
-                let own = (found.solved, found.sums, &mut background[..]);
-                signatures_of(own, forward, |band, signature| to.put(number * bands + band, signature));
-                let own = found.importance;
-                let found = [&*own.shares, &*own.terms, &*own.diffuse, &*own.emission];
-                for (table, found) in tables.iter_mut().zip(found) {
-                    let to = table.iter_mut().skip(number * found.len());
-                    to.zip(found).for_each(|(to, from)| *to = *from);
-                }
+                put_view((found, forward), (number, bands), &to, &mut tables);
                 number += 1;
                 if runner.told(number as f64 / views.0.len() as f64) { Ok(()) } else { Err(Error::Cancelled) }
             });
@@ -155,4 +152,24 @@ pub unsafe extern "C" fn blik_explain(
         // SAFETY: by the caller's promise.
         unsafe { with_scratch(scratch, scratch_size, wanted, work) }
     })
+}
+
+/// Writes one view's signatures, and the tables of what they are made of and depend on.
+// apart: the background's bands do not burden the stack of solving
+#[inline(never)]
+fn put_view(
+    (found, forward): (&Explained<'_>, Vec3),
+    (number, bands): (usize, usize),
+    to: &Signatures,
+    tables: &mut [&mut [f64]; 4],
+) {
+    let mut background = [0.0; MAX_BANDS];
+    let own = (found.solved, found.sums, &mut background[..]);
+    signatures_of(own, forward, |band, signature| to.put(number * bands + band, signature));
+    let own = found.importance;
+    let found = [&*own.shares, &*own.terms, &*own.diffuse, &*own.emission];
+    for (table, found) in tables.iter_mut().zip(found) {
+        let to = table.iter_mut().skip(number * found.len());
+        to.zip(found).for_each(|(to, from)| *to = *from);
+    }
 }

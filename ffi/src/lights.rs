@@ -12,8 +12,9 @@ use blik_kernel::arena::ALIGNMENT;
 use blik_kernel::chain::Solved;
 use blik_kernel::coupling::Coupling;
 use blik_kernel::facets;
-use blik_kernel::light::LightInput;
+use blik_kernel::light::{Light, LightInput};
 use blik_kernel::math::Vec3;
+use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::scene::MAX_BANDS;
 use blik_kernel::stages::Lights;
 use core::ffi::c_void;
@@ -244,11 +245,12 @@ fn solve_all(
         // SAFETY: a lane's memory is used by that lane alone; the lights are the caller's promise.
         let (memory, light) = unsafe {
             let memory = core::slice::from_raw_parts_mut(start.at(lane_number * lane), lane);
-            (memory, lights.get(number, coupling)?)
+            (memory, &lights.get(number, coupling))
         };
+        let light = light.as_ref().map_err(|error| *error)?;
         let views = lane_bytes()?;
         let (memory, scratch) = memory.split_at_mut_checked(lane - views).unwrap_or_default();
-        solve_one(&all, coupling, (number, &light), out, memory, scratch)
+        solve_one(&all, coupling, (number, light), out, memory, scratch)
             .map_err(|error| of_light(error, number))
     })
 }
@@ -262,26 +264,34 @@ fn solve_one(
     memory: &mut [u8],
     scratch: &mut [u8],
 ) -> Result<(), blik_error> {
-    let (scene, bands) = (all.scene, all.scene.bands());
-    let light = input.light(scene)?;
-    let solution = all.solve(input, &light, None, memory)?;
+    // in one place of the stack: it is large
+    let light = input.light(all.scene);
+    let light = light.as_ref().map_err(|error| *error)?;
+    let solution = all.solve(input, light, None, memory)?;
+    put_light(all, coupling, (number, light), &solution, out, scratch)
+}
+
+/// Writes what is wanted of a solved light.
+// apart: does not burden the stack of solving
+#[inline(never)]
+fn put_light(
+    all: &Lights<'_>,
+    coupling: &blik_coupling,
+    (number, light): (usize, &Light<'_>),
+    solution: &Solution<'_>,
+    out: &LightOutputs,
+    scratch: &mut [u8],
+) -> Result<(), blik_error> {
     let settings = coupling.settings.asked.chains(coupling.rays);
-    let (bvh, elements) = (all.bvh, all.elements);
-    let solved = Solved { scene, bvh, elements, light: &light, solution, settings };
+    let (scene, bvh, elements, solution) = (all.scene, all.bvh, all.elements, *solution);
+    let bands = scene.bands();
+    let solved = Solved { scene, bvh, elements, light, solution, settings };
     let parts = [0, 1].map(|k| {
         // SAFETY: every light is handed out once, and the arrays have `values` entries for each.
         unsafe { core::slice::from_raw_parts_mut(out.facets[k].at(number * out.values[k]), out.values[k]) }
     });
     if parts.iter().any(|part| !part.is_empty()) {
-        let mut both = [[0.0; MAX_BANDS]; 2];
-        let [e, l] = both.each_mut().map(|all| all.split_at_mut(bands.min(MAX_BANDS)).0);
-        let [irradiance, radiance] = parts;
-        for place in 0..scene.facets() * scene.sides() {
-            let (facet, side) = (place / scene.sides().max(1), place % scene.sides().max(1));
-            facets::side(&solved, all.coupling, solved.sun, facet, side, e, l);
-            irradiance.iter_mut().skip(place * bands).zip(&*e).for_each(|(to, from)| *to = *from);
-            radiance.iter_mut().skip(place * bands).zip(&*l).for_each(|(to, from)| *to = *from);
-        }
+        put_facets(&solved, all.coupling, parts);
     }
     let Some(signatures) = &out.signatures else { return Ok(()) };
     let views = out.directions.len() / 3;
@@ -291,4 +301,19 @@ fn solve_one(
         })?;
     }
     Ok(())
+}
+
+/// Writes irradiances and radiances of all facets, those that there is room for.
+// apart: their bands do not burden the stack of signatures
+#[inline(never)]
+fn put_facets(solved: &Solved<'_>, coupling: &Coupling<'_>, [irradiance, radiance]: [&mut [f64]; 2]) {
+    let (scene, bands) = (solved.scene, solved.scene.bands());
+    let mut both = [[0.0; MAX_BANDS]; 2];
+    let [e, l] = both.each_mut().map(|all| all.split_at_mut(bands.min(MAX_BANDS)).0);
+    for place in 0..scene.facets() * scene.sides() {
+        let (facet, side) = (place / scene.sides().max(1), place % scene.sides().max(1));
+        facets::side(solved, coupling, solved.sun, facet, side, e, l);
+        irradiance.iter_mut().skip(place * bands).zip(&*e).for_each(|(to, from)| *to = *from);
+        radiance.iter_mut().skip(place * bands).zip(&*l).for_each(|(to, from)| *to = *from);
+    }
 }

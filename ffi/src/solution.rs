@@ -249,14 +249,16 @@ fn build(
     let mut arena = Arena::new(rest, 0)?;
     let kept = keep(given, &plan, &mut arena)?;
     let (scene, elements) = (&coupling.base.scene, &coupling.elements);
-    let light = kept.light(scene)?;
+    // in one place of the stack: it is large
+    let light = kept.light(scene);
+    let light = light.as_ref().map_err(|error| *error)?;
     let mut solution = plan.sizes.solution.take(&mut arena)?;
     let mut scratch = plan.sizes.take_scratch(&mut arena)?;
     let beam_memory = arena.keep::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
     let matrix = coupling.matrix()?;
     let settings = &coupling.settings.asked;
     let bvh = &coupling.base.bvh;
-    let lighting = Lighting { scene, bvh, elements, coupling: &matrix, light: &light, settings };
+    let lighting = Lighting { scene, bvh, elements, coupling: &matrix, light, settings };
     let mut rays = lighting.direct(given.reference, &mut solution, &mut scratch, runner)?;
     let mut beams = Beams::default();
     beams.add(&lighting, &mut solution, &mut scratch, beam_memory, runner)?;
@@ -264,8 +266,26 @@ fn build(
     let record = lighting.solve(solution, &mut scratch, rays, runner)?;
     let bytes = plan.kept().bytes()?;
     // SAFETY: `place` made room for it.
-    unsafe { place.write(blik_solution::new(coupling, light, kept, record, bytes)) };
+    unsafe { put(place, coupling, light, &kept, &record, bytes) };
     Ok(place.as_ptr())
+}
+
+/// Writes the handle.
+///
+/// # Safety
+/// There is room for it.
+// apart: it does not burden the stack of solving
+#[inline(never)]
+unsafe fn put(
+    place: core::ptr::NonNull<blik_solution>,
+    coupling: &'static blik_coupling,
+    light: &Light<'static>,
+    kept: &LightInput<'static>,
+    record: &Solution<'static>,
+    bytes: usize,
+) {
+    // SAFETY: by the caller's promise.
+    unsafe { place.write(blik_solution::new(coupling, *light, *kept, *record, bytes)) };
 }
 
 /// Bytes of memory that [`blik_solution_init`] needs for this light, at any address. More speeds up scenes with mirrors
@@ -322,12 +342,15 @@ pub unsafe extern "C" fn blik_solution_init(
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
-        let (coupling, given, mut runner, memory) = unsafe {
+        let (coupling, given) = unsafe {
             let coupling: &blik_coupling = object(coupling)?;
-            let given = given_light(light, &coupling.base.scene)?;
-            (coupling, given, Runner::new(run)?, bytes(memory, size)?)
+            (coupling, &given_light(light, &coupling.base.scene))
         };
-        let made = build(coupling, &given, memory, &mut runner)?;
+        // in one place of the stack: it is large
+        let given = given.as_ref().map_err(|error| *error)?;
+        // SAFETY: by the caller's promise.
+        let (mut runner, memory) = unsafe { (Runner::new(run)?, bytes(memory, size)?) };
+        let made = build(coupling, given, memory, &mut runner)?;
         // SAFETY: not null.
         unsafe { to.write(made) };
         Ok(())

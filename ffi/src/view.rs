@@ -243,7 +243,9 @@ pub unsafe extern "C" fn blik_image(
         // SAFETY: by the caller's promise.
         let (solution, mut runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         // SAFETY: by the caller's promise.
-        let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
+        let camera = &unsafe { self::camera(camera, &solution.coupling.base.scene) };
+        // in one place of the stack: it is large
+        let camera = camera.as_ref().map_err(|error| *error)?;
         let bands = solution.record.shape.bands;
         // SAFETY: by the caller's promise.
         let (mut out, tally) = unsafe {
@@ -251,9 +253,9 @@ pub unsafe extern "C" fn blik_image(
             let out = Out::new((pixels, pixel_count), (components, component_count), expected)?;
             (out, Place::optional(tally)?)
         };
-        let (fixed, lane) = scratch_parts(&camera, bands)?;
+        let (fixed, lane) = scratch_parts(camera, bands)?;
         let wanted = fixed + lane * runner.lanes();
-        let work = |given: &mut [u8]| paint(solution, &camera, &mut out, given, &mut runner);
+        let work = |given: &mut [u8]| paint(solution, camera, &mut out, given, &mut runner);
         // SAFETY: by the caller's promise.
         let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
         if let Some(to) = tally {
@@ -283,7 +285,8 @@ fn paint(
     let (buffers, piece) = (Start(buffers.as_mut_ptr()), piece(rows));
     let items = rows.div_ceil(piece);
     let stride = camera.columns() * bands;
-    let solved = solution.solved();
+    let mut solved = solution.solved();
+    image::prepare(&mut solved, camera);
     let pixels = Start(out.pixels.as_mut_ptr());
     let [a, b, c] = &mut out.components;
     let with = !a.is_empty();
@@ -302,7 +305,7 @@ fn paint(
             let components = parts.each_ref().map(|start| own(start, part));
             let mut target = Target { image: own(&pixels, size), components };
             let buffer = core::slice::from_raw_parts_mut(buffers.at(lane * lane_size), lane_size);
-            let tally = image::rows(&solved, camera, range, &mut target, buffer)?;
+            let tally = image::prepared_rows(&solved, camera, range, &mut target, buffer)?;
             tallies.at(item).write(tally);
         }
         Ok(())
@@ -361,8 +364,9 @@ pub unsafe extern "C" fn blik_image_rows(
         };
         let mut target = Target { image: out.pixels, components: out.components };
         let wanted = image::scratch_bytes(&camera, bands)?;
-        let work =
-            |given: &mut [u8]| Ok(image::rows(&solution.solved(), &camera, range, &mut target, given)?);
+        let mut solved = solution.solved();
+        image::prepare(&mut solved, &camera);
+        let work = |given: &mut [u8]| Ok(image::prepared_rows(&solved, &camera, range, &mut target, given)?);
         // SAFETY: by the caller's promise.
         let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
         if let Some(to) = tally {

@@ -196,9 +196,19 @@ impl<'m> Baked<'m> {
         if blocks.len() != wanted || checksum(memory) != head.checksum {
             return Err(Error::Block);
         }
-        Baked::read(&head, memory, isa, blocks).map_err(|_| Error::Block)
+        // in one place of the stack: it is large
+        let mut baked = Baked::read(&head, memory, isa, blocks);
+        let sound = baked.as_ref().is_ok_and(|baked| {
+            baked.solution.as_ref().is_none_or(|solution| solution.has_light(&baked.scene))
+        });
+        if !sound {
+            baked = Err(Error::Block);
+        }
+        baked
     }
 
+    // apart: does not burden the stack of checking the light
+    #[inline(never)]
     fn read(
         head: &Head,
         memory: &'m [u8],
@@ -234,9 +244,6 @@ impl<'m> Baked<'m> {
         let shape = settings::shape(max_bounces, scene.bands());
         let solved = head.solved == 1;
         let solution = solved.then(|| Solution::get(&mut view, &elements, shape)).transpose()?;
-        if let Some(solution) = &solution {
-            solution.light(&scene)?;
-        }
         Ok(Baked { scene, bvh, elements, blocks, settings, solution })
     }
 }
@@ -352,6 +359,13 @@ impl<'m> Solution<'m> {
             && positive(&record.numbers.brightest)
             && record.numbers.solver >= 0.0;
         if right { Ok(()) } else { Err(Error::Block) }
+    }
+
+    /// Whether the kernel takes its light.
+    // apart, as the light is large
+    #[inline(never)]
+    fn has_light(&self, scene: &Scene<'_>) -> bool {
+        self.light(scene).is_ok()
     }
 
     /// The kernel's light.

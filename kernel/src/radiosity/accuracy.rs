@@ -215,7 +215,9 @@ const ONE_EACH: f64 = 1e-6;
 
 /// Takes the mean of what is met off a row's checks, where outlines tell how much is met: its entries are multiplied so
 /// that they fill it, and their halves differ by what differs from the mean alone.
-#[inline(always)]
+// apart on small machines: does not burden the stack of skies
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline(always))]
 fn about_mean<L: Lanes>(
     system: &System<'_>,
     unknown: usize,
@@ -244,7 +246,7 @@ fn about_mean<L: Lanes>(
         }
     }
     let scale = system.straight.scale(unknown, bands, &row.row);
-    for (sums, mean) in sums.iter_mut().zip(means) {
+    for (sums, mean) in sums.iter_mut().zip(&means) {
         sums.iter_mut().zip(half_differences).for_each(|(sum, c)| *sum = scale * (*sum - mean / met * c));
     }
 }

@@ -13,6 +13,7 @@ pub(crate) const SWEPT_MARGIN: f64 = 1.0 / (1u64 << 26) as f64;
 /// The half spaces whose common region holds all rays that leave a facet of these corners on the side of `normal` along
 /// `direction`, or along any within an angle of sine `spread` of it, from where rays start; `None` where the direction is too
 /// near to an edge's for such a region.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
 pub(crate) fn swept(
     corners: &[Vec3; 3],
     normal: Vec3,
@@ -33,6 +34,7 @@ pub(crate) fn swept(
 
 /// The normal of the plane along an edge and the direction, turned outward so far that all within the spread are on the
 /// side of the other corner; `None` where they are all around.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
 fn inward(edge: Vec3, other: Vec3, direction: Vec3, spread: f64) -> Option<Vec3> {
     let across = edge.cross(direction);
     let length = sqrt(across.dot(across));

@@ -42,7 +42,13 @@ impl<'a> LightInput<'a> {
         if let Some(reference) = self.reference {
             check_reference(reference, scene.bands())?;
         }
-        Light::new(self.sky.as_ref(), self.sun.as_ref(), scene.bands())?.with_emission(scene, self.emission)
+        // in one place of the stack: it is large
+        let mut light = Light::new(self.sky.as_ref(), self.sun.as_ref(), scene.bands());
+        if let Ok(light) = &mut light {
+            check_emission(scene, self.emission)?;
+            light.emission = self.emission;
+        }
+        light
     }
 }
 
@@ -57,13 +63,32 @@ impl<'a> Light<'a> {
         sun: Option<&SunInput<'a>>,
         bands: usize,
     ) -> Result<Light<'a>, Error> {
-        let mut sky = sky.map(|input| Sky::new(input, bands)).transpose()?;
+        let mut light = Light::as_given(sky, sun, bands);
+        if let Ok(light) = &mut light {
+            light.take_sun();
+        }
+        light
+    }
+
+    /// A light of sky and sun as they are given.
+    // apart, as is the next: the parts of a light being made do not burden the stack of finding the sun
+    #[inline(never)]
+    fn as_given(
+        sky: Option<&SkyInput<'a>>,
+        sun: Option<&SunInput<'a>>,
+        bands: usize,
+    ) -> Result<Light<'a>, Error> {
+        let sky = sky.map(|input| Sky::new(input, bands)).transpose()?;
         let sun = sun.map(|input| Sun::new(input, bands)).transpose()?;
-        let spot = match (&mut sky, &sun) {
-            (Some(sky), None) => sky.take_sun().map(|(spot, factors)| Sun::of_spot(&spot, factors)),
-            _ => None,
-        };
-        Ok(Light { sky, sun: sun.or(spot), emission: &[] })
+        Ok(Light { sky, sun, emission: &[] })
+    }
+
+    /// Makes a table's bright spot the sun where there is none.
+    #[inline(never)]
+    fn take_sun(&mut self) {
+        if let (Some(sky), None) = (&mut self.sky, &self.sun) {
+            self.sun = sky.take_sun().map(|(spot, factors)| Sun::of_spot(&spot, factors));
+        }
     }
 
     /// The same with an emission of its own: `values` for each facet, side and band, bands innermost, 0..=1e37 W m-2 sr-1; empty:
@@ -74,20 +99,7 @@ impl<'a> Light<'a> {
     /// [`Error::Uncoupled`] where a facet emits whose material neither reflects diffusely nor emits: couplings have no entries
     /// for what it sends.
     pub fn with_emission(self, scene: &Scene<'_>, values: &'a [f64]) -> Result<Light<'a>, Error> {
-        let stride = scene.sides() * scene.bands();
-        let (expected, field) = (scene.facets() * stride, Field::Emission);
-        if !values.is_empty() && values.len() != expected {
-            return Err(Error::LightBandCount { field, expected, given: values.len() });
-        }
-        for (at, &value) in values.iter().enumerate() {
-            let (facet, band) = (at / stride.max(1), at % scene.bands().max(1));
-            if !(0.0..=RADIANCE_LARGEST).contains(&value) {
-                return Err(Error::FacetRange { facet, band, field, value });
-            }
-            if value > 0.0 && scene.areas().at(facet) > 0.0 && !scene.glows(scene.material(facet)) {
-                return Err(Error::Uncoupled { facet, field });
-            }
-        }
+        check_emission(scene, values)?;
         Ok(Light { emission: values, ..self })
     }
 }
@@ -173,6 +185,25 @@ impl Light<'_> {
             sky.largest_radiance(out);
         }
     }
+}
+
+/// Checks a light's own emission; see [`Light::with_emission`].
+fn check_emission(scene: &Scene<'_>, values: &[f64]) -> Result<(), Error> {
+    let stride = scene.sides() * scene.bands();
+    let (expected, field) = (scene.facets() * stride, Field::Emission);
+    if !values.is_empty() && values.len() != expected {
+        return Err(Error::LightBandCount { field, expected, given: values.len() });
+    }
+    for (at, &value) in values.iter().enumerate() {
+        let (facet, band) = (at / stride.max(1), at % scene.bands().max(1));
+        if !(0.0..=RADIANCE_LARGEST).contains(&value) {
+            return Err(Error::FacetRange { facet, band, field, value });
+        }
+        if value > 0.0 && scene.areas().at(facet) > 0.0 && !scene.glows(scene.material(facet)) {
+            return Err(Error::Uncoupled { facet, field });
+        }
+    }
+    Ok(())
 }
 
 /// Checks a light's reference radiance given by the user: one positive finite value per band.

@@ -118,6 +118,23 @@ struct SkyMemory<'m> {
     variance: &'m mut [f32],
 }
 
+impl SkyMemory<'_> {
+    /// Whether what is kept is of this sky.
+    // apart, as is the next: a sky's bands do not burden the stack of solving
+    #[inline(never)]
+    fn is_of(&self, sky: &SkyInput<'_>, light: &Light<'_>, reference: &[f64]) -> bool {
+        self.head.first().is_some_and(|head| *head == KeptSky::of(sky, light, reference))
+    }
+
+    /// Notes that what is kept is of this sky.
+    #[inline(never)]
+    fn note(&mut self, sky: &SkyInput<'_>, light: &Light<'_>, reference: &[f64]) {
+        if let Some(head) = self.head.first_mut() {
+            *head = KeptSky::of(sky, light, reference);
+        }
+    }
+}
+
 impl Lights<'_> {
     fn shape(&self) -> TableShape {
         settings::shape(self.settings.max_bounces, self.scene.bands())
@@ -181,7 +198,7 @@ impl Lights<'_> {
         let Lights { scene, bvh, elements, coupling, settings } = *self;
         let lighting = Lighting { scene, bvh, elements, coupling, light, settings };
         let [direct, values, variance] = self.sky_values();
-        let kept = SkyMemory {
+        let mut kept = SkyMemory {
             head: arena.keep(1)?,
             direct: arena.keep(direct)?,
             straight: arena.keep(values)?,
@@ -191,15 +208,15 @@ impl Lights<'_> {
         let mut scratch = sizes.take_scratch(&mut arena)?;
         let beam_memory = arena.keep::<u8>(arena.left().saturating_sub(ALIGNMENT))?;
         lighting.begin(input.reference.or(given), &mut solution, &mut scratch)?;
-        let own = input.sky.map(|sky| KeptSky::of(&sky, light, solution.reference));
-        if own.is_some() && kept.head.first() == own.as_ref() {
+        let sky = input.sky.as_ref();
+        if sky.is_some_and(|sky| kept.is_of(sky, light, solution.reference)) {
             copy(scratch.direct, kept.direct);
             copy(solution.straight, kept.straight);
             copy(solution.straight_variance, kept.variance);
         } else {
             lighting.sky(&mut solution, &mut scratch, &mut Alone)?;
-            if let (Some(own), Some(head)) = (own, kept.head.first_mut()) {
-                *head = own;
+            if let Some(sky) = sky {
+                kept.note(sky, light, solution.reference);
                 copy(kept.direct, scratch.direct);
                 copy(kept.straight, solution.straight);
                 copy(kept.variance, solution.straight_variance);
@@ -259,18 +276,34 @@ impl Lights<'_> {
         let (solution, mut scratch) = self.solve_in((input, light), given, sizes, arena)?;
         let Lights { scene, bvh, elements, coupling, settings } = *self;
         let lighting = Lighting { scene, bvh, elements, coupling, light, settings };
-        let solved = Solved { scene, bvh, elements, light, solution, settings: chains };
+        let solved = &Solved { scene, bvh, elements, light, solution, settings: chains };
         for (number, forward) in views.iter().enumerate() {
-            let mut importance = Importance::take(scene, elements, &mut Arena::new(first, parts[0])?)?;
-            let mut adjoint =
-                AdjointMemory::take(elements.unknowns(), self.shape(), &mut Arena::new(second, parts[1])?)?;
-            let view = View::new(&solved, Vec3::from_array(*forward), cells)?;
-            let sums = signature::explained(&solved, &view, scratch_memory, &mut importance)?;
-            let report = lighting.differentiate(&solution, &mut scratch, &mut importance, &mut adjoint)?;
-            each(number, &Explained { solved: &solved, sums, importance: &importance, report })?;
+            let view = (Vec3::from_array(*forward), cells);
+            let memory = [&mut *first, &mut *second, &mut *scratch_memory];
+            explain_view((&lighting, solved), view, &mut scratch, memory, |found| each(number, found))?;
         }
         Ok(())
     }
+}
+
+/// Explains one view, a direction and its cells, and calls `each` with what was found. The memory is for importance,
+/// the transposed system and the signature.
+// apart: does not burden the stack of solving
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+fn explain_view(
+    (lighting, solved): (&Lighting<'_>, &Solved<'_>),
+    (forward, cells): (Vec3, usize),
+    scratch: &mut Scratch<'_>,
+    [first, second, third]: [&mut [u8]; 3],
+    each: impl FnOnce(&Explained<'_>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let (scene, elements) = (solved.scene, solved.elements);
+    let mut importance = Importance::take(scene, elements, &mut Arena::new(first, 0)?)?;
+    let mut adjoint = AdjointMemory::take(elements.unknowns(), solved.shape, &mut Arena::new(second, 0)?)?;
+    let view = View::new(solved, forward, cells)?;
+    let sums = signature::explained(solved, &view, third, &mut importance)?;
+    let report = lighting.differentiate(&solved.solution, scratch, &mut importance, &mut adjoint)?;
+    each(&Explained { solved, sums, importance: &importance, report })
 }
 
 /// What a signature is made of and depends on.

@@ -11,7 +11,8 @@ impl Sky<'_> {
     /// Sum of the radiance per band over directions packed in twice [`SKY_BITS`] bits, into `out`.
     ///
     /// As good as [`Sky::radiance`] of each, to 1e-6 of the sum.
-    #[inline(always)]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline(always))]
     pub(crate) fn sum<L: Lanes>(&self, lanes: L, packed: &[u32], out: &mut [f64]) {
         let rays = packed.len() as f64;
         if matches!(self.model, Model::Cie(_) | Model::Table(_)) {
@@ -70,7 +71,9 @@ const CHUNKS: usize = 16;
 
 /// Sums of the heights of packed directions over the horizon of `up`: in f32, good to 1e-6, as the directions are no
 /// better than 6.6e-5.
-#[inline(always)]
+// apart on small machines: does not burden the stack of other models
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline(always))]
 fn heights<L: Lanes>(lanes: L, packed: &[u32], up: Vec3) -> Sums {
     let up = [up.x, up.y, up.z].map(|x| lanes.splat8(x as f32));
     let (mut sums, mut parts) = ([0.0; 3], [lanes.splat8(0.0); 3]);

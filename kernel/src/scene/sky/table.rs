@@ -207,6 +207,7 @@ impl<'a> Table<'a> {
     }
 
     /// Takes the brightest spot out, where it is small and far brighter than what stands about it. `factors` are the bands'.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     pub(super) fn take_sun(&mut self, factors: &[f64]) -> Option<SpotSun<'a>> {
         let weight = |sample: &[f32]| {
             let factor = |band: usize| factors.get(band).copied().unwrap_or(1.0);
@@ -377,6 +378,7 @@ impl<'a> Table<'a> {
     }
 
     /// Adds the part of the cells between two rows of samples in which rings are.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn add_gap(
         &self,
         rings: &Rings,
@@ -433,6 +435,7 @@ impl<'a> Table<'a> {
 impl Rings {
     /// The rings of a panel, two elevations in a gap from `top` to `bottom`, for a normal of the given horizontal length
     /// and height.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn fill(&mut self, (top, bottom): (f64, f64), panel: &[f64], across: f64, height: f64, points: usize) {
         self.count = 0;
         let &[from, to] = panel else { return };
