@@ -236,11 +236,8 @@ pub unsafe extern "C" fn blik_load(
         // in one place of the stack each: they are large
         let baked = Baked::load(block, Isa::detect(), table);
         let baked = baked.as_ref().map_err(|error| *error)?;
-        let light = match &baked.solution {
-            Some(solution) => Some(&solution.light(&baked.scene)),
-            None => None,
-        };
-        let light = match light {
+        let light = baked.solution.as_ref().map(|solution| solution.light(&baked.scene));
+        let light = match &light {
             Some(light) => Some(light.as_ref().map_err(|error| *error)?),
             None => None,
         };
