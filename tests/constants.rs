@@ -116,6 +116,7 @@ fn comments_name_what_they_speak_of() {
         faults.extend(vague(source).into_iter().map(|(line, comment)| format!("{file}:{line}:{comment}")));
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+    // the name is code; of the comments the first alone is vague
     assert_eq!(vague("let so_many = 1; // so many\n// rays\n").len(), 1);
 }
 

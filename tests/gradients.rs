@@ -93,7 +93,7 @@ fn derivatives(lights: &Lights<'_>, input: &LightInput<'_>) -> (Vec<f64>, Vec<f6
     all
 }
 
-/// Differences of a quantity over so much both ways.
+/// Central difference quotient of a quantity.
 const STEP: f64 = 1e-4;
 
 /// Holds a derivative to a difference: to 1e-6 of it, and to 1e-9 of the largest derivative, for rounding of sums over all

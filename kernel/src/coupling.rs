@@ -26,7 +26,7 @@ use crate::base::simd::{self, Isa, Task};
 use crate::coupling::element::Local;
 use bundle::Bundles;
 use core::ops::Range;
-use mirror_path::MirrorPath;
+use mirror_path::{MirrorPath, STRAIGHT};
 
 plain_struct! {
     /// One term of a row, escapes only while it grows: then they are put in [`bundle`]s. The gradient is how the weight
@@ -348,6 +348,18 @@ impl<'m> RowView<'m> {
             let products = self.products(record.path());
             sums.iter_mut().zip(products).for_each(|(s, p)| *s += record.weight * p);
         }
+    }
+
+    /// What the row holds of the sky seen straight, with the sign by which it counts: what is blocked is taken off the whole sky,
+    /// what is open makes it up.
+    #[inline(always)]
+    pub fn straight_sky(&self) -> impl Iterator<Item = (<Bundles<'m> as IntoIterator>::Item, f64)> + use<'m> {
+        let enclosed = self.row.state == ENCLOSED;
+        let straight = self.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT));
+        straight.map(move |bundle| {
+            let sign = if bundle.path == BLOCKED && !enclosed { -1.0 } else { 1.0 };
+            (bundle, sign)
+        })
     }
 
     /// Mirrors on a path.

@@ -135,7 +135,7 @@ impl System<'_> {
         let (unknown, band) = (at / bands, at % bands);
         let facet = self.elements.facet_of(unknown).0;
         let rho = self.scene.diffuse(self.scene.material(facet)).at(band);
-        let area = self.scene.areas().at(facet) * self.elements.share(unknown);
+        let area = self.elements.area(self.scene, unknown);
         if rho > 0.0 { area / rho } else { 0.0 }
     }
 
@@ -323,7 +323,7 @@ impl System<'_> {
             let (mut sum, mut all, mut sent) = (0.0, 0.0, 0.0);
             for (unknown, row) in self.coupling.rows(0..self.coupling.unknowns()) {
                 let facet = self.elements.facet_of(unknown).0;
-                let area = self.scene.areas().at(facet) * self.elements.share(unknown);
+                let area = self.elements.area(self.scene, unknown);
                 sent += area * self.emission(unknown, band);
                 if self.scene.diffuse(self.scene.material(facet)).at(band) > 0.0 {
                     let area = area * f64::from(row.row.visible_share);

@@ -13,7 +13,7 @@ use crate::radiosity::beam::BeamSettings;
 use crate::radiosity::direct::TableShape;
 use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
-use crate::view::chain::{ChainSettings, GATHERS, PixelArea, finds_thrown_sun};
+use crate::view::chain::{ChainSettings, PixelArea, finds_thrown_sun};
 
 /// What a caller asks of the stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ impl Settings {
     /// irradiance of each is wanted, and where points find no light for themselves: what curved mirrors and narrow lobes throw
     /// of the sun stays a mean over elements.
     pub fn clusters(&self, scene: &Scene<'_>) -> usize {
-        let apart = self.all_irradiances || !GATHERS || !finds_thrown_sun(scene);
+        let apart = self.all_irradiances || !finds_thrown_sun(scene);
         if apart { 0 } else { cluster::wanted(scene.facets(), self.budget.solution) }
     }
 

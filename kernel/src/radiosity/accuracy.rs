@@ -272,9 +272,8 @@ fn add_targets(row: &RowView<'_>, radiance: &[f64], sums: &mut [[f64; 4]]) {
 /// Adds half the difference between the halves of a row's rays of what they see of the sky straight.
 #[inline(always)]
 fn add_straight<L: Lanes>(row: &RowView<'_>, sky: &Sky<'_>, lanes: L, light: &mut [f64], sums: &mut [f64]) {
-    for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
+    for (bundle, sign) in row.straight_sky() {
         sky.sum(lanes, bundle.packed, light);
-        let sign = if bundle.path == BLOCKED && row.row.state != ENCLOSED { -1.0 } else { 1.0 };
         let [first, second, ..] = bundle.half_differences.map(f64::from);
         sums.iter_mut().zip(&*light).for_each(|(sum, l)| *sum += sign * (first + second) * l);
     }

@@ -9,8 +9,7 @@ use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
 use crate::base::quarter::{self, QUARTERS};
 use crate::base::simd::{self, Isa, LaneTask, Lanes};
 use crate::coupling::element::Elements;
-use crate::coupling::mirror_path::STRAIGHT;
-use crate::coupling::{ABSENT, BLOCKED, Coupling, ENCLOSED, Row, RowView, TRACED};
+use crate::coupling::{ABSENT, Coupling, ENCLOSED, Row, RowView, TRACED};
 use crate::radiosity::accuracy;
 use crate::rays::bvh::Bvh;
 use crate::rays::outline::{Basis, Candidates, OpenSky};
@@ -102,10 +101,8 @@ impl<'a> Straight<'a> {
         }
         let scale = self.scale(unknown, bands, &row.row);
         let mut short = [a, b];
-        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
-            // what is open has the other sign
-            let sign = if bundle.path == BLOCKED && row.row.state != ENCLOSED { -scale } else { scale };
-            let sign = sign * bundle.rays();
+        for (bundle, sign) in row.straight_sky() {
+            let sign = sign * scale * bundle.rays();
             short.iter_mut().zip(bundle.gradient).for_each(|(s, g)| *s += sign * f64::from(g));
         }
         Some(([mean, a, b], short))
@@ -279,15 +276,13 @@ impl LaneTask for ClusterSky<'_, '_> {
         let mut light = [0.0; MAX_BANDS];
         let mut checks = [[0.0; 4]; MAX_BANDS];
         let (light, checks) = (light.head_mut(bands), checks.head_mut(bands));
-        let enclosed = row.row.state == ENCLOSED;
-        let whole = ((of.scene, of.elements), (of.sky, of.goal));
-        let of_normals = whole_sky(whole.0, whole.1, unknown, of.reference, values.head_mut(bands));
-        if enclosed {
+        let (mesh, sky) = ((of.scene, of.elements), (of.sky, of.goal));
+        let of_normals = whole_sky(mesh, sky, unknown, of.reference, values.head_mut(bands));
+        if row.row.state == ENCLOSED {
             values.head_mut(bands).fill(0.0);
         }
-        for bundle in row.escapes.into_iter().filter(|bundle| matches!(bundle.path, BLOCKED | STRAIGHT)) {
+        for (bundle, sign) in row.straight_sky() {
             of.sky.sum(lanes, bundle.packed, light);
-            let sign = if bundle.path == BLOCKED && !enclosed { -1.0 } else { 1.0 };
             light.iter_mut().for_each(|l| *l *= sign);
             values.iter_mut().zip(&*light).for_each(|(sum, l)| *sum += PI * bundle.weight * l);
             accuracy::add(checks, bundle.half_differences, light.iter().copied());

@@ -33,6 +33,12 @@ const SUN_RAYS_FACTOR_MOST: f64 = 32.0;
 /// Most rays toward the sun's disc from one point.
 const MOST_DISC_RAYS: u32 = 1024;
 
+/// Whether part of the sun's disc, or of an image of it, may stand above the plane of a surface.
+#[inline]
+fn faces(surface: &Surface, sun: &Sun<'_>) -> bool {
+    surface.normal.dot(sun.direction()) > -sun.half_angle()
+}
+
 impl Solved<'_> {
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
@@ -299,8 +305,7 @@ impl Solved<'_> {
     ) {
         let (Some(sun), Some(lobe)) = (&self.light.sun, &mirror.lobe) else { return };
         let mirrored = surface.mirrored(self.scene, state.ray.direction);
-        let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
-        if shows(sun) {
+        if faces(surface, sun) {
             self.add_straight_gloss(state, surface, (sun, lobe, mirrored), mode, terms, path);
         }
         self.add_image_gloss(state, surface, (sun, lobe, mirrored), mode, terms, path);
@@ -319,13 +324,12 @@ impl Solved<'_> {
         path: &mut Path,
     ) {
         let bands = self.shape.bands;
-        let shows = |sun: &Sun<'_>| surface.normal.dot(sun.direction()) > -sun.half_angle();
         let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
         let mut images = mode.occluders.images(self, surface, sun.half_angle());
         while let Some(one) = images.next(mode.occluders) {
             let axis = one.axis;
             let image = sun.seen_toward(axis);
-            if !shows(&image) {
+            if !faces(surface, &image) {
                 continue;
             }
             if !self.may_show(&one, surface, sun, mode.occluders) {
