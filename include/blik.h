@@ -11,8 +11,9 @@
  *       -> blik_solution           sky and sun, solved                 once per light
  *       -> blik_image, blik_signatures, blik_radiance, blik_facets     once per view
  *
- * ffi/examples/minimal.c does so in 50 lines. blik_form_factor.h has form factors of polygons without a scene,
- * blik_plane.h the same photometry in two dimensions, blik.hpp owners and exceptions for C++17.
+ * ffi/examples/minimal.c does so in 50 lines. blik_lights.h has many lights in one call and what signatures depend on,
+ * blik_form_factor.h form factors of polygons without a scene, blik_plane.h the same photometry in two dimensions,
+ * blik.hpp owners and exceptions for C++17.
  *
  * What is computed.  The diffuse radiance of a facet is its emission plus its diffuse reflectance over pi times what
  *   arrives: from sky and sun, straight and by way of mirrors, and from all other facets, straight and by way of mirrors.
@@ -38,10 +39,10 @@
  *   written is followed by the number of entries that there is room for, which must be exactly what the call writes.
  * Structs.  Set those that start with struct_size by their init function (inline, below), outputs too, before the
  *   members that differ: a library that is newer than the header reads and writes no more than the header knows.
- * Stability.  The functions and structs of blik.h and blik_form_factor.h are stable: within a minor version nothing is
- *   taken away, and structs that are not called frozen may get members at their end. blik_plane.h may change with every
- *   minor version. While the major version is 0 a new minor version may change all of it; CHANGELOG.md says how callers
- *   adapt.
+ * Stability.  The functions and structs of blik.h, blik_lights.h and blik_form_factor.h are stable: within a minor
+ *   version nothing is taken away, and structs that are not called frozen may get members at their end. blik_plane.h may
+ *   change with every minor version. While the major version is 0 a new minor version may change all of it; CHANGELOG.md
+ *   says how callers adapt.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
@@ -197,20 +198,13 @@ typedef enum blik_field {
 /* What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
  * to be set before. Frozen: it does not grow. */
 typedef struct blik_error {
-    /* The status that the call returned. */
-    blik_status status;
-    /* What it is about. */
-    blik_field field;
-    /* Index of the facet, vertex, normal, material, ray or direction that it is about; else 0. */
-    size_t index;
-    /* Spectral band; else 0. */
-    size_t band;
-    /* The offending value; else 0. */
-    double value;
-    /* Bytes or entries needed, or the limit; else 0. */
-    size_t needed;
-    /* Bytes or entries given; else 0. */
-    size_t given;
+    blik_status status; /* The status that the call returned. */
+    blik_field field; /* What it is about. */
+    size_t index; /* Index of the facet, vertex, normal, material, ray or direction that it is about; else 0. */
+    size_t band; /* Spectral band; else 0. */
+    double value; /* The offending value; else 0. */
+    size_t needed; /* Bytes or entries needed, or the limit; else 0. */
+    size_t given; /* Bytes or entries given; else 0. */
 } blik_error;
 
 /* What a refused call tells, in one line without its end: status, field, value, index, sizes.
@@ -247,18 +241,12 @@ typedef int32_t (*blik_progress)(void *user, double done);
 
 /* How a long stage runs. A null pointer to it stands for its defaults. The results do not depend on it. */
 typedef struct blik_run {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Runs tasks on threads of the caller; null (default): the calling thread alone. */
-    blik_parallel parallel;
-    /* Handed to parallel. */
-    void *parallel_user;
-    /* Tasks that parallel is given at once, 1 to 256: as many as there are threads; default 1. */
-    size_t lanes;
-    /* Told the progress; null (default): nobody. */
-    blik_progress progress;
-    /* Handed to progress. */
-    void *progress_user;
+    size_t struct_size; /* Size of this struct. */
+    blik_parallel parallel; /* Runs tasks on threads of the caller; null (default): the calling thread alone. */
+    void *parallel_user; /* Handed to parallel. */
+    size_t lanes; /* Tasks that parallel is given at once, 1 to 256: as many as there are threads; default 1. */
+    blik_progress progress; /* Told the progress; null (default): nobody. */
+    void *progress_user; /* Handed to progress. */
 } blik_run;
 
 /* Sets the defaults of a blik_run. */
@@ -298,14 +286,10 @@ typedef enum blik_format {
 /* An array as the caller keeps it: entries stride bytes apart, each of as many numbers as its use needs, packed.
  * count 0: absent. Frozen: it does not grow. */
 typedef struct blik_array {
-    /* First entry, aligned as its numbers need; not read when count is 0. */
-    const void *data;
-    /* Number of entries. */
-    size_t count;
-    /* Bytes from one entry to the next; 0: the size of an entry. */
-    size_t stride;
-    /* Type of the numbers. */
-    blik_format format;
+    const void *data; /* First entry, aligned as its numbers need; not read when count is 0. */
+    size_t count; /* Number of entries. */
+    size_t stride; /* Bytes from one entry to the next; 0: the size of an entry. */
+    blik_format format; /* Type of the numbers. */
 } blik_array;
 
 /* "No vertex normal" among the indices of normals. */
@@ -317,42 +301,30 @@ typedef struct blik_array {
 /* Reflectances and emission of one material, one value per band each; a null pointer stands for zeros.
  * Arrays of it have a stride: it may grow. */
 typedef struct blik_material {
-    /* Diffuse reflectance, in [0, 1]. */
-    const double *diffuse;
+    const double *diffuse; /* Diffuse reflectance, in [0, 1]. */
     /* Mirror reflectance, in [0, 1]; diffuse + specular <= 1. With gloss: the lobe's albedo at normal view. */
     const double *specular;
-    /* Own diffuse radiance, >= 0, W m-2 sr-1. */
-    const double *emission;
+    const double *emission; /* Own diffuse radiance, >= 0, W m-2 sr-1. */
     /* 0: an ideal mirror; else long over short axis of the lobe, >= 1 (1e4 and above: an ideal mirror). */
     double gloss_axis_ratio;
-    /* Rays at the first hit of the lobe, up to 65536; 0: by tolerance. */
-    uint32_t gloss_rays;
+    uint32_t gloss_rays; /* Rays at the first hit of the lobe, up to 65536; 0: by tolerance. */
 } blik_material;
 
 /* A mesh with its materials. Read during the call only. */
 typedef struct blik_mesh {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Positions: three BLIK_F64 or BLIK_F32 each, in any unit and at any offset. */
-    blik_array vertices;
-    /* Three vertex indices (BLIK_U8 to BLIK_U64) a facet, counter-clockwise seen from the front. */
-    blik_array facets;
-    /* Material of each facet (BLIK_U8 to BLIK_U64); absent: all 0. */
-    blik_array facet_materials;
+    size_t struct_size; /* Size of this struct. */
+    blik_array vertices; /* Positions: three BLIK_F64 or BLIK_F32 each, in any unit and at any offset. */
+    blik_array facets; /* Three vertex indices (BLIK_U8 to BLIK_U64) a facet, counter-clockwise seen from the front. */
+    blik_array facet_materials; /* Material of each facet (BLIK_U8 to BLIK_U64); absent: all 0. */
     /* Normals for interpolated mirror directions, three BLIK_F64 or BLIK_F32 each; absent: mirrors are flat. */
     blik_array normals;
     /* Three normal indices a facet (BLIK_U32 or BLIK_U64), all bits set for none; absent: as facets. */
     blik_array facet_normals;
-    /* The materials. */
-    const blik_material *materials;
-    /* Number of materials, at least 1. */
-    size_t material_count;
-    /* Bytes from one material to the next; set by the init function. */
-    size_t material_stride;
-    /* Spectral bands, 1 to 64; default 1. */
-    size_t bands;
-    /* Not 0: both sides carry material and emission; default 0: backs are black and opaque. */
-    int32_t two_sided;
+    const blik_material *materials; /* The materials. */
+    size_t material_count; /* Number of materials, at least 1. */
+    size_t material_stride; /* Bytes from one material to the next; set by the init function. */
+    size_t bands; /* Spectral bands, 1 to 64; default 1. */
+    int32_t two_sided; /* Not 0: both sides carry material and emission; default 0: backs are black and opaque. */
 } blik_mesh;
 
 /* Sets the defaults of a blik_mesh; its arrays are absent, of type f64 and u32. */
@@ -408,20 +380,13 @@ BLIK_API void blik_scene_destroy(blik_scene *scene);
 
 /* Numbers of a scene. */
 typedef struct blik_scene_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Facets, degenerate ones included. */
-    size_t facets;
-    /* Facets of no area: they keep their index and take no part. */
-    size_t degenerate_facets;
-    /* Materials. */
-    size_t materials;
-    /* Spectral bands. */
-    size_t bands;
-    /* Sides of a facet that carry its material: 1 or 2. */
-    size_t sides;
-    /* Bytes in use. */
-    size_t bytes;
+    size_t struct_size; /* Size of this struct. */
+    size_t facets; /* Facets, degenerate ones included. */
+    size_t degenerate_facets; /* Facets of no area: they keep their index and take no part. */
+    size_t materials; /* Materials. */
+    size_t bands; /* Spectral bands. */
+    size_t sides; /* Sides of a facet that carry its material: 1 or 2. */
+    size_t bytes; /* Bytes in use. */
 } blik_scene_info;
 
 /* Sets struct_size of a blik_scene_info. */
@@ -441,14 +406,10 @@ BLIK_API blik_status blik_scene_get_info(const blik_scene *scene, blik_error *er
 
 /* A ray in the mesh's coordinates. Frozen: it does not grow. */
 typedef struct blik_ray {
-    /* Where it starts. */
-    double origin[3];
-    /* Unit vector along it; default (0, 0, -1). */
-    double direction[3];
-    /* Hits at this distance and beyond do not count, 0 or more; default the largest number: no limit. */
-    double t_max;
-    /* Index of the facet that it leaves and never hits; default BLIK_NO_FACET: none. */
-    uint32_t skip;
+    double origin[3]; /* Where it starts. */
+    double direction[3]; /* Unit vector along it; default (0, 0, -1). */
+    double t_max; /* Hits at this distance and beyond do not count, 0 or more; default the largest number: no limit. */
+    uint32_t skip; /* Index of the facet that it leaves and never hits; default BLIK_NO_FACET: none. */
 } blik_ray;
 
 /* Sets the defaults of a blik_ray: from the origin down, without a limit. */
@@ -463,16 +424,11 @@ static inline void blik_ray_init(blik_ray *ray)
 
 /* Where a ray meets the mesh first. Frozen: it does not grow. */
 typedef struct blik_hit {
-    /* Distance along the ray in the mesh's unit; infinity where it meets nothing. */
-    double t;
-    /* Barycentric weight of the facet's second corner. */
-    double u;
-    /* Barycentric weight of the facet's third corner. */
-    double v;
-    /* Index of the facet, or BLIK_NO_FACET. */
-    uint32_t facet;
-    /* 1 where it meets the side on which the corners run counter-clockwise. */
-    int32_t front;
+    double t; /* Distance along the ray in the mesh's unit; infinity where it meets nothing. */
+    double u; /* Barycentric weight of the facet's second corner. */
+    double v; /* Barycentric weight of the facet's third corner. */
+    uint32_t facet; /* Index of the facet, or BLIK_NO_FACET. */
+    int32_t front; /* 1 where it meets the side on which the corners run counter-clockwise. */
 } blik_hit;
 
 /* The first facet that each ray meets: at the least distance; among equals a front before a back, then the lowest index.
@@ -508,14 +464,10 @@ typedef void (*blik_any_facets)(void *user, const blik_ray *rays, size_t count, 
 
 /* A ray tracer of the caller's over the mesh of a scene. */
 typedef struct blik_intersector {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Finds first facets; must not be null. */
-    blik_first_facets first_facets;
-    /* Finds whether there is any; null (default): by first_facets. */
-    blik_any_facets any_facets;
-    /* Handed to both. */
-    void *user;
+    size_t struct_size; /* Size of this struct. */
+    blik_first_facets first_facets; /* Finds first facets; must not be null. */
+    blik_any_facets any_facets; /* Finds whether there is any; null (default): by first_facets. */
+    void *user; /* Handed to both. */
 } blik_intersector;
 
 /* Sets the defaults of a blik_intersector. */
@@ -545,12 +497,10 @@ BLIK_API blik_status blik_scene_set_intersector(blik_scene *scene, const blik_in
 
 /* What decides the coupling besides the scene. */
 typedef struct blik_settings {
-    /* Size of this struct. */
-    size_t struct_size;
+    size_t struct_size; /* Size of this struct. */
     /* The wanted rms error of an image's pixels relative to the reference radiance: 1e-6 to 0.1; default 2e-3. */
     double tolerance;
-    /* Light reflected more often does not count; below 0 (default): by tolerance. */
-    int32_t max_bounces;
+    int32_t max_bounces; /* Light reflected more often does not count; below 0 (default): by tolerance. */
     /* Not 0: irradiance of all facets is wanted, also of those that reflect nothing diffusely; default 0. */
     int32_t all_irradiances;
     /* Not 0 (default): any sky can light the scene without new rays; 0: uniform skies only, in less memory, and in
@@ -635,31 +585,21 @@ BLIK_API void blik_coupling_destroy(blik_coupling *coupling);
 
 /* Numbers of a coupling. */
 typedef struct blik_coupling_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Elements that the facets are cut into. */
-    size_t elements;
-    /* Sides of elements: rows of the coupling. */
-    size_t unknowns;
-    /* Form factors kept. */
-    uint64_t pairs;
+    size_t struct_size; /* Size of this struct. */
+    size_t elements; /* Elements that the facets are cut into. */
+    size_t unknowns; /* Sides of elements: rows of the coupling. */
+    uint64_t pairs; /* Form factors kept. */
     /* Rows that nothing needs: of degenerate facets, or of facets that reflect nothing diffusely. */
     uint64_t skipped_rows;
-    /* Rows that see the sky alone: no ray was traced. */
-    uint64_t open_rows;
-    /* Rays traced. */
-    uint64_t rays;
-    /* Largest weight of mirror chains that were cut, as a share of the hemisphere: a bound. */
-    double dropped;
+    uint64_t open_rows; /* Rows that see the sky alone: no ray was traced. */
+    uint64_t rays; /* Rays traced. */
+    double dropped; /* Largest weight of mirror chains that were cut, as a share of the hemisphere: a bound. */
     /* Bytes in use. Of a coupling that blik_coupling_init made: from the start of its memory, the rest of which is
      * free again. */
     size_t bytes;
-    /* Facets of its scene, degenerate ones included. */
-    size_t facets;
-    /* Sides of a facet that carry its material: 1 or 2. */
-    size_t sides;
-    /* Spectral bands. */
-    size_t bands;
+    size_t facets; /* Facets of its scene, degenerate ones included. */
+    size_t sides; /* Sides of a facet that carry its material: 1 or 2. */
+    size_t bands; /* Spectral bands. */
 } blik_coupling_info;
 
 /* Sets struct_size of a blik_coupling_info. */
@@ -690,29 +630,20 @@ typedef enum blik_sky_model {
 
 /* A sky. Read during the call only: its arrays are copied. */
 typedef struct blik_sky {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* How radiance varies; default BLIK_SKY_UNIFORM. */
-    blik_sky_model model;
-    /* 1 to 15: the type of a CIE sky; default 1. */
-    uint32_t cie_type;
+    size_t struct_size; /* Size of this struct. */
+    blik_sky_model model; /* How radiance varies; default BLIK_SKY_UNIFORM. */
+    uint32_t cie_type; /* 1 to 15: the type of a CIE sky; default 1. */
     /* Radiance per band as the model uses it (for a table a factor), W m-2 sr-1; null (default): 1. */
     const double *radiance;
-    /* Radiance below the horizon per band; null (default): 0. */
-    const double *ground;
-    /* Toward the zenith, of any length but zero; default (0, 0, 1). */
-    double up[3];
-    /* Toward the sun of a CIE sky, above the horizon. */
-    double sun_direction[3];
+    const double *ground; /* Radiance below the horizon per band; null (default): 0. */
+    double up[3]; /* Toward the zenith, of any length but zero; default (0, 0, 1). */
+    double sun_direction[3]; /* Toward the sun of a CIE sky, above the horizon. */
     /* Samples of a table: table_rows x table_columns x table_bands, row by row from the zenith down, columns
      * counter-clockwise seen from above; bilinear between the centres. */
     const float *table;
-    /* Steps of elevation. */
-    size_t table_rows;
-    /* Steps of azimuth. */
-    size_t table_columns;
-    /* 1, or the scene's number of bands; default 1. */
-    size_t table_bands;
+    size_t table_rows; /* Steps of elevation. */
+    size_t table_columns; /* Steps of azimuth. */
+    size_t table_bands; /* 1, or the scene's number of bands; default 1. */
     /* Azimuth 0 of a table, projected off up; zeros (default): (1, 0, 0), or (0, 1, 0) where that is up. */
     double table_azimuth_zero[3];
 } blik_sky;
@@ -737,14 +668,11 @@ static inline void blik_sky_init(blik_sky *sky)
 
 /* The sun. Read during the call only. */
 typedef struct blik_sun {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Toward the centre of the sun, of any length but zero; default (0, 0, 1). */
-    double direction[3];
+    size_t struct_size; /* Size of this struct. */
+    double direction[3]; /* Toward the centre of the sun, of any length but zero; default (0, 0, 1). */
     /* Irradiance per band of an unshaded plane that faces the sun, W m-2; null (default): pi. */
     const double *irradiance;
-    /* Angular radius in degrees: 0 (a point) or 1e-4 to 10; default 0.2665. */
-    double half_angle_deg;
+    double half_angle_deg; /* Angular radius in degrees: 0 (a point) or 1e-4 to 10; default 0.2665. */
 } blik_sun;
 
 /* Sets the defaults of a blik_sun: irradiance pi from above. */
@@ -759,20 +687,16 @@ static inline void blik_sun_init(blik_sun *sun)
 
 /* The light of a scene. Read during the call only. */
 typedef struct blik_light {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* The sky; null (default): none. */
-    const blik_sky *sky;
-    /* The sun; null (default): none. */
-    const blik_sun *sun;
+    size_t struct_size; /* Size of this struct. */
+    const blik_sky *sky; /* The sky; null (default): none. */
+    const blik_sun *sun; /* The sun; null (default): none. */
     /* The radiance per band to which errors are related; null (default): from the light. */
     const double *reference_radiance;
     /* Own diffuse radiance of each facet, side and band, bands innermost, 0 to 1e37 W m-2 sr-1, in place of the materials'
      * emission: new temperatures ask for no ray. Facets whose materials neither reflect diffusely nor emit may emit nothing
      * here, either (BLIK_ERROR_UNCOUPLED). Null (default): the materials'. */
     const double *emission;
-    /* Number of those values: facets x sides x bands; 0 (default) without them. */
-    size_t emission_count;
+    size_t emission_count; /* Number of those values: facets x sides x bands; 0 (default) without them. */
 } blik_light;
 
 /* Sets the defaults of a blik_light: none. */
@@ -833,14 +757,10 @@ BLIK_API void blik_solution_destroy(blik_solution *solution);
 
 /* Numbers of a solution. */
 typedef struct blik_solution_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Facets of its scene, degenerate ones included. */
-    size_t facets;
-    /* Sides of a facet that carry its material: 1 or 2. */
-    size_t sides;
-    /* Spectral bands. */
-    size_t bands;
+    size_t struct_size; /* Size of this struct. */
+    size_t facets; /* Facets of its scene, degenerate ones included. */
+    size_t sides; /* Sides of a facet that carry its material: 1 or 2. */
+    size_t bands; /* Spectral bands. */
 } blik_solution_info;
 
 /* Sets struct_size of a blik_solution_info. */
@@ -883,26 +803,16 @@ typedef enum blik_sampling {
 
 /* A camera. Row 0 is the top; nothing before the eye is seen. */
 typedef struct blik_camera {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* BLIK_ORTHOGRAPHIC (default) or BLIK_PERSPECTIVE. */
-    blik_projection projection;
-    /* BLIK_SAMPLE_AREA (default) or BLIK_SAMPLE_CENTRE. */
-    blik_sampling sampling;
-    /* Position of the eye, in the mesh's coordinates. */
-    double eye[3];
-    /* The point in the image's middle. */
-    double target[3];
-    /* What is up in the image; default (0, 0, 1). */
-    double up[3];
-    /* Orthographic: height of the image in the mesh's unit. */
-    double height;
-    /* Perspective: vertical field of view in degrees. */
-    double fov_deg;
-    /* Pixels across, 1 to 65536. */
-    size_t columns;
-    /* Pixels down, 1 to 65536. */
-    size_t rows;
+    size_t struct_size; /* Size of this struct. */
+    blik_projection projection; /* BLIK_ORTHOGRAPHIC (default) or BLIK_PERSPECTIVE. */
+    blik_sampling sampling; /* BLIK_SAMPLE_AREA (default) or BLIK_SAMPLE_CENTRE. */
+    double eye[3]; /* Position of the eye, in the mesh's coordinates. */
+    double target[3]; /* The point in the image's middle. */
+    double up[3]; /* What is up in the image; default (0, 0, 1). */
+    double height; /* Orthographic: height of the image in the mesh's unit. */
+    double fov_deg; /* Perspective: vertical field of view in degrees. */
+    size_t columns; /* Pixels across, 1 to 65536. */
+    size_t rows; /* Pixels down, 1 to 65536. */
 } blik_camera;
 
 /* Sets the defaults of a blik_camera; eye, target, height or fov_deg, columns and rows have none. */
@@ -923,22 +833,14 @@ static inline void blik_camera_init(blik_camera *camera)
 
 /* What was done on rows of an image; tallies of all its rows add up by blik_tally_add. */
 typedef struct blik_tally {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Pixels whose centre ray meets the object. */
-    uint64_t object_pixels;
-    /* Rays through pixels. */
-    uint64_t primary_rays;
-    /* Rays of chains and toward the sun. */
-    uint64_t chain_rays;
-    /* Pixels sampled more than once. */
-    uint64_t refined_pixels;
-    /* Sum over object pixels of the squared expected error from the diffuse solution. */
-    double noise_squared;
-    /* Sum over object pixels of the squared expected error from sampling the pixel's area. */
-    double sampling_squared;
-    /* Largest bound on what cut chains could still have brought. */
-    double chain_tail;
+    size_t struct_size; /* Size of this struct. */
+    uint64_t object_pixels; /* Pixels whose centre ray meets the object. */
+    uint64_t primary_rays; /* Rays through pixels. */
+    uint64_t chain_rays; /* Rays of chains and toward the sun. */
+    uint64_t refined_pixels; /* Pixels sampled more than once. */
+    double noise_squared; /* Sum over object pixels of the squared expected error from the diffuse solution. */
+    double sampling_squared; /* Sum over object pixels of the squared expected error from sampling the pixel's area. */
+    double chain_tail; /* Largest bound on what cut chains could still have brought. */
 } blik_tally;
 
 /* Sets a blik_tally to nothing done. */
@@ -1021,42 +923,27 @@ typedef enum blik_limit {
 
 /* What comes back with an image. */
 typedef struct blik_report {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* The wanted error, of the solution where images have one of their own. */
-    double tolerance;
+    size_t struct_size; /* Size of this struct. */
+    double tolerance; /* The wanted error, of the solution where images have one of their own. */
     /* Expected error of the image (rms over the pixels that meet the object), relative to the reference radiance. */
     double error_estimate;
     /* Certain bound on the distance of the radiances from the solution of the discrete system. */
     double certified_solver;
-    /* Certain bound on what chains that were cut could still have brought to a pixel. */
-    double certified_chain_tail;
+    double certified_chain_tail; /* Certain bound on what chains that were cut could still have brought to a pixel. */
     /* Certain bound on the weight of couplings that were cut, as a share of the hemisphere. */
     double certified_dropped;
-    /* Rays that coupling traced. */
-    uint64_t visibility_rays;
-    /* Rays toward the sun, and of beams, which mirrors reflect. */
-    uint64_t sun_rays;
-    /* Rays through pixels. */
-    uint64_t primary_rays;
-    /* Rays of specular chains and toward the sun from what pixels see. */
-    uint64_t chain_rays;
-    /* Form factors kept. */
-    uint64_t pairs;
-    /* Rows of the coupling that nothing needed. */
-    uint64_t skipped_rows;
-    /* Rows of the coupling that see the sky alone. */
-    uint64_t open_rows;
-    /* Elements. */
-    size_t elements;
-    /* Bytes of the scene, of the coupling and of the solution. */
-    size_t bytes;
-    /* Sweeps over the linear system. */
-    uint32_t sweeps;
-    /* 1 where the estimate is at most the wanted error of images. */
-    int32_t tolerance_met;
-    /* The largest part of the estimate. */
-    blik_limit limited_by;
+    uint64_t visibility_rays; /* Rays that coupling traced. */
+    uint64_t sun_rays; /* Rays toward the sun, and of beams, which mirrors reflect. */
+    uint64_t primary_rays; /* Rays through pixels. */
+    uint64_t chain_rays; /* Rays of specular chains and toward the sun from what pixels see. */
+    uint64_t pairs; /* Form factors kept. */
+    uint64_t skipped_rows; /* Rows of the coupling that nothing needed. */
+    uint64_t open_rows; /* Rows of the coupling that see the sky alone. */
+    size_t elements; /* Elements. */
+    size_t bytes; /* Bytes of the scene, of the coupling and of the solution. */
+    uint32_t sweeps; /* Sweeps over the linear system. */
+    int32_t tolerance_met; /* 1 where the estimate is at most the wanted error of images. */
+    blik_limit limited_by; /* The largest part of the estimate. */
 } blik_report;
 
 /* Sets struct_size of a blik_report. */
@@ -1076,24 +963,16 @@ BLIK_API blik_status blik_get_report(const blik_solution *solution, const blik_t
 
 /* The rounds of an image: what was asked, and what the last round came to. */
 typedef struct blik_rounds {
-    /* Size of this struct. */
-    size_t struct_size;
+    size_t struct_size; /* Size of this struct. */
     /* The wanted error of the image, 1e-6 to 0.1: image_tolerance of the settings of every round; default 2e-3. */
     double asked;
-    /* Tolerance of the coupling of the next round; set by blik_rounds_next. */
-    double tolerance;
-    /* Rounds so far; kept by blik_rounds_next, as all that follows. */
-    uint32_t done;
-    /* Not 0: the diffuse solution limited the last round. */
-    int32_t last_by_visibility;
-    /* Tolerance of the last round. */
-    double last_tolerance;
-    /* Error estimate of the last round. */
-    double last_estimate;
-    /* Rays of visibility of the last round. */
-    uint64_t last_rays;
-    /* Bytes of the last round. */
-    size_t last_bytes;
+    double tolerance; /* Tolerance of the coupling of the next round; set by blik_rounds_next. */
+    uint32_t done; /* Rounds so far; kept by blik_rounds_next, as all that follows. */
+    int32_t last_by_visibility; /* Not 0: the diffuse solution limited the last round. */
+    double last_tolerance; /* Tolerance of the last round. */
+    double last_estimate; /* Error estimate of the last round. */
+    uint64_t last_rays; /* Rays of visibility of the last round. */
+    size_t last_bytes; /* Bytes of the last round. */
 } blik_rounds;
 
 /* Sets the rounds of an image of which the error `asked` is wanted:
@@ -1159,18 +1038,12 @@ BLIK_API blik_status blik_radiance(const blik_solution *solution, const blik_ray
 
 /* What a distant observer measures in one direction and band. Arrays of it have a stride: it may grow. */
 typedef struct blik_signature {
-    /* Radiant intensity toward the observer, W/sr. */
-    double radiant_intensity;
-    /* Area of the object's projection, in the square of the mesh's unit. */
-    double projected_area;
-    /* Radiant intensity over projected area; 0 where nothing is seen. */
-    double mean_radiance;
-    /* Radiance of the sky behind. */
-    double background;
-    /* (mean radiance - background)/background; 0 where the background is 0. */
-    double contrast;
-    /* Expected error of the radiant intensity, W/sr. */
-    double error_estimate;
+    double radiant_intensity; /* Radiant intensity toward the observer, W/sr. */
+    double projected_area; /* Area of the object's projection, in the square of the mesh's unit. */
+    double mean_radiance; /* Radiant intensity over projected area; 0 where nothing is seen. */
+    double background; /* Radiance of the sky behind. */
+    double contrast; /* (mean radiance - background)/background; 0 where the background is 0. */
+    double error_estimate; /* Expected error of the radiant intensity, W/sr. */
     /* Glints that may lie between cells, or be met by chance and count too much: what they bring on the mean, W/sr; not
      * among the error. */
     double unresolved_glints;
@@ -1208,98 +1081,6 @@ BLIK_API blik_status blik_signatures(const blik_solution *solution, const double
 BLIK_API blik_status blik_facets(const blik_solution *solution, size_t first, size_t count, blik_error *error,
     double *areas, size_t area_count, double *irradiance, size_t irradiance_count, double *radiance,
     size_t radiance_count);
-
-/* Bytes of scratch memory with which blik_lights keeps all lanes of run busy. More speeds up scenes with mirrors that
- * scatter sunlight.
- *
- *   coupling      the coupling
- *   lights        the lights
- *   light_count   number of lights
- *   light_stride  bytes from one light to the next: sizeof(blik_light)
- *   run           how the call runs; null: on the calling thread
- *   error         receives what is wrong where the call is refused; null: not wanted
- *   bytes         receives the bytes; less is for fewer lanes */
-BLIK_API blik_status blik_lights_scratch_size(const blik_coupling *coupling, const blik_light *lights,
-    size_t light_count, size_t light_stride, const blik_run *run, blik_error *error, size_t *bytes);
-
-/* Solves many lights against one coupling: suns, skies, emissions of facets. Each is solved by one task; lights of the same
- * sky share what is known of it. The results have the bits of blik_solution_init, blik_facets and blik_signatures one by
- * one. To have what sun, sky and emission bring apart, light the scene by each alone (an emission of zeros where facets emit),
- * with one reference_radiance: they add up to what all bring together, to the tolerance. Outputs of lights that
- * were done before one is refused are written. An error's index is the light's number; where a facet's emission
- * is refused, index is the facet and given the light's number.
- *
- *   coupling          the coupling
- *   lights            the lights
- *   light_count       number of lights
- *   light_stride      bytes from one light to the next: sizeof(blik_light)
- *   directions        three numbers a view, from the observer toward the object, of any length but zero
- *   direction_count   number of views
- *   cells             cells along each side of the projection, one ray each, up to 65536; 0: by tolerance
- *   run               how the call runs; null: on the calling thread
- *   scratch           scratch memory; with the standard library null takes it from the heap
- *   scratch_size      its bytes
- *   error             receives what is wrong where the call is refused; null: not wanted
- *   irradiance        receives mean irradiance, one value a light, facet, side and band, bands innermost; null: not
- *                     wanted
- *   irradiance_count  number of values that there is room for: lights x facets x sides x bands
- *   radiance          receives as many diffuse radiances; null: not wanted
- *   radiance_count    number of values that there is room for: lights x facets x sides x bands
- *   signatures        receives one entry a light, view and band, bands innermost; null where there are no views
- *   signature_count   number of entries that there is room for: lights x views x bands
- *   signature_stride  bytes from one entry to the next: sizeof(blik_signature) */
-BLIK_API blik_status blik_lights(const blik_coupling *coupling, const blik_light *lights, size_t light_count,
-    size_t light_stride, const double *directions, size_t direction_count, size_t cells, const blik_run *run,
-    void *scratch, size_t scratch_size, blik_error *error, double *irradiance, size_t irradiance_count,
-    double *radiance, size_t radiance_count, blik_signature *signatures, size_t signature_count,
-    size_t signature_stride);
-
-/* Bytes of scratch memory for blik_explain. More is for scenes with mirrors that scatter sunlight.
- *
- *   coupling  the coupling
- *   light     the light
- *   error     receives what is wrong where the call is refused; null: not wanted
- *   bytes     receives the bytes */
-BLIK_API blik_status blik_explain_scratch_size(const blik_coupling *coupling, const blik_light *light,
-    blik_error *error, size_t *bytes);
-
-/* Solves a scene for its light and tells of the signature in each direction what it is made of and how it changes with
- * diffuse reflectances and emissions of all facets, by the transposed system. Shares of facets, and terms, add up to the radiant
- * intensity. Derivatives are those of the numbers that the solver's equations define, of elements and rays as they are; chains
- * between mirrors that are cut at the tolerance end there for them. With sky and sun signatures are linear: their derivatives by
- * those are the signatures under each alone (blik_lights). Refused where max_bounces counts reflections
- * (BLIK_ERROR_RANGE). The whole call runs on the calling thread; calls on other threads may run besides.
- *
- *   coupling           the coupling
- *   light              the light
- *   directions         three numbers a view, from the observer toward the object, of any length but zero
- *   direction_count    number of views
- *   cells              cells along each side of the projection, one ray each, up to 65536; 0: by tolerance
- *   run                the defaults or a progress function, told once a view; tasks are not used
- *   scratch            scratch memory; with the standard library null takes it from the heap
- *   scratch_size       its bytes
- *   error              receives what is wrong where the call is refused; null: not wanted
- *   signatures         receives one entry a view and band, bands innermost: the bits of blik_signatures
- *   signature_count    number of entries that there is room for: views x bands
- *   signature_stride   bytes from one entry to the next: sizeof(blik_signature)
- *   shares             receives what the observer sees of each facet first, W/sr, one value a view, facet and band;
- *                      null: not wanted
- *   share_count        number of values that there is room for: views x facets x bands
- *   terms              receives three values a view and band, W/sr: all bands' diffuse, then mirrored sky and sun, then
- *                      mirrored diffuse; null: not wanted
- *   term_count         number of values that there is room for: views x 3 x bands
- *   by_diffuse         receives derivatives of the radiant intensity by each facet's diffuse reflectance, W/sr, one
- *                      value a view, facet and band; 0 where a facet reflects nothing diffusely in the band; null: not
- *                      wanted
- *   by_diffuse_count   number of values that there is room for: views x facets x bands
- *   by_emission        receives derivatives by the emission of each facet and side, in the square of the mesh's unit,
- *                      one value a view, facet, side and band; null: not wanted
- *   by_emission_count  number of values that there is room for: views x facets x sides x bands */
-BLIK_API blik_status blik_explain(const blik_coupling *coupling, const blik_light *light, const double *directions,
-    size_t direction_count, size_t cells, const blik_run *run, void *scratch, size_t scratch_size, blik_error *error,
-    blik_signature *signatures, size_t signature_count, size_t signature_stride, double *shares, size_t share_count,
-    double *terms, size_t term_count, double *by_diffuse, size_t by_diffuse_count, double *by_emission,
-    size_t by_emission_count);
 
 /* ---- Baked blocks: a prepared scene as bytes --------------------------------------------------------------------- */
 

@@ -25,6 +25,7 @@
 
 #include <blik.h>
 #include <blik_form_factor.h>
+#include <blik_lights.h>
 #include <blik_plane.h>
 
 #include <array>

@@ -34,16 +34,13 @@ typedef enum blik_plane_ray_set {
 
 /* Reflectances of a body of the plane model. Arrays of it have a stride: it may grow. */
 typedef struct blik_plane_material {
-    /* Diffuse reflectance, in [0, 1]; default 0. */
-    double diffuse;
+    double diffuse; /* Diffuse reflectance, in [0, 1]; default 0. */
     /* Mirror reflectance, in [0, 1], diffuse + specular <= 1; with gloss the lobe's albedo at normal view; default 0. */
     double specular;
     /* 0 (default): an ideal mirror; else long over short axis of the lobe, >= 1 (1e4 and above: an ideal mirror). */
     double gloss_axis_ratio;
-    /* Full angle between the side rays of the paper's three, radians, 0 to 3.2. */
-    double spacing;
-    /* How rays stand for the lobe; default AUTO. */
-    blik_plane_ray_set ray_set;
+    double spacing; /* Full angle between the side rays of the paper's three, radians, 0 to 3.2. */
+    blik_plane_ray_set ray_set; /* How rays stand for the lobe; default AUTO. */
     /* Rays of GAUSS, EQUAL and SPLIT at the first lobe of a path, at the second, and later: 1 to 4096. */
     uint32_t rays[3];
 } blik_plane_material;
@@ -71,22 +68,15 @@ typedef enum blik_plane_shape {
  * for a solid body, clockwise for a cavity) and whose backs are black and opaque. Bodies touch at most in corners.
  * Arrays of it have a stride: it may grow. */
 typedef struct blik_plane_body {
-    /* Circle (default), polyline or polygon. */
-    blik_plane_shape shape;
+    blik_plane_shape shape; /* Circle (default), polyline or polygon. */
     /* Not 0: the segments stand for a smooth curve, whose normals and radiance are interpolated; default 0. */
     int32_t smooth;
-    /* Index of the material; default 0. */
-    uint32_t material;
-    /* Elements of the circle, or of each segment, 1 to 2^20; default 1. */
-    uint32_t elements;
-    /* Centre of a circle. */
-    double centre[2];
-    /* Radius of a circle, positive; default 1. */
-    double radius;
-    /* Two numbers a point; not read for a circle. */
-    const double *points;
-    /* At least 2 of a polyline, 3 of a polygon, whose first is not repeated. */
-    size_t point_count;
+    uint32_t material; /* Index of the material; default 0. */
+    uint32_t elements; /* Elements of the circle, or of each segment, 1 to 2^20; default 1. */
+    double centre[2]; /* Centre of a circle. */
+    double radius; /* Radius of a circle, positive; default 1. */
+    const double *points; /* Two numbers a point; not read for a circle. */
+    size_t point_count; /* At least 2 of a polyline, 3 of a polygon, whose first is not repeated. */
 } blik_plane_body;
 
 /* Sets the defaults of a blik_plane_body: a circle of radius 1 at the origin. */
@@ -104,20 +94,13 @@ static inline void blik_plane_body_init(blik_plane_body *body)
 
 /* What a plane scene is made of. Read during the call only. */
 typedef struct blik_plane_bodies {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* The bodies, at least one. */
-    const blik_plane_body *bodies;
-    /* Number of bodies. */
-    size_t body_count;
-    /* Bytes from one body to the next; set by the init function. */
-    size_t body_stride;
-    /* The materials, at least one. */
-    const blik_plane_material *materials;
-    /* Number of materials. */
-    size_t material_count;
-    /* Bytes from one material to the next; set by the init function. */
-    size_t material_stride;
+    size_t struct_size; /* Size of this struct. */
+    const blik_plane_body *bodies; /* The bodies, at least one. */
+    size_t body_count; /* Number of bodies. */
+    size_t body_stride; /* Bytes from one body to the next; set by the init function. */
+    const blik_plane_material *materials; /* The materials, at least one. */
+    size_t material_count; /* Number of materials. */
+    size_t material_stride; /* Bytes from one material to the next; set by the init function. */
 } blik_plane_bodies;
 
 /* Sets the defaults of a blik_plane_bodies: none. */
@@ -146,21 +129,15 @@ enum {
 
 /* How a plane scene is solved. All but the tolerance follows from it. */
 typedef struct blik_plane_settings {
-    /* Size of this struct. */
-    size_t struct_size;
+    size_t struct_size; /* Size of this struct. */
     /* Wanted error relative to the sky, 1e-13 to 0.1, on bodies that are cut finely enough (a circle of 12 elements at
      * 1e-4, 16 at 1e-5); default 1e-4. */
     double tolerance;
-    /* How the diffuse radiance varies, BLIK_PLANE_AUTO (default), _CONSTANT, _LINEAR or _PANELS. */
-    int32_t basis;
-    /* Gauss points of an element, 1 to 6, where basis is PANELS. */
-    uint32_t order;
-    /* How rows are integrated, BLIK_PLANE_AUTO (default), _FACETS or _SPLIT. */
-    int32_t method;
-    /* Nodes or chains of the method, up to 4096, where that is not AUTO. */
-    uint32_t points;
-    /* Light reflected more often does not count, 1 to 64; below 0 (default): by cutoff. */
-    int32_t max_bounces;
+    int32_t basis; /* How the diffuse radiance varies, BLIK_PLANE_AUTO (default), _CONSTANT, _LINEAR or _PANELS. */
+    uint32_t order; /* Gauss points of an element, 1 to 6, where basis is PANELS. */
+    int32_t method; /* How rows are integrated, BLIK_PLANE_AUTO (default), _FACETS or _SPLIT. */
+    uint32_t points; /* Nodes or chains of the method, up to 4096, where that is not AUTO. */
+    int32_t max_bounces; /* Light reflected more often does not count, 1 to 64; below 0 (default): by cutoff. */
     /* Chains end where their mirrors leave less than this share, up to 1; below 0 (default): by tolerance. */
     double cutoff;
     /* Bound on the solver's error relative to the brightest light, up to 1; below 0 (default): by tolerance. */
@@ -220,16 +197,11 @@ BLIK_API void blik_plane_scene_destroy(blik_plane_scene *scene);
 
 /* Numbers of a plane scene. */
 typedef struct blik_plane_scene_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Bodies. */
-    size_t bodies;
-    /* Circles and segments. */
-    size_t primitives;
-    /* Unknowns of the linear system. */
-    size_t unknowns;
-    /* Bytes in use. */
-    size_t bytes;
+    size_t struct_size; /* Size of this struct. */
+    size_t bodies; /* Bodies. */
+    size_t primitives; /* Circles and segments. */
+    size_t unknowns; /* Unknowns of the linear system. */
+    size_t bytes; /* Bytes in use. */
 } blik_plane_scene_info;
 
 /* Sets struct_size of a blik_plane_scene_info. */
@@ -248,22 +220,16 @@ BLIK_API blik_status blik_plane_scene_get_info(const blik_plane_scene *scene, bl
 
 /* A ray of the plane. Frozen: it does not grow. */
 typedef struct blik_plane_ray {
-    /* Where it starts. */
-    double origin[2];
-    /* Unit vector along it. */
-    double direction[2];
+    double origin[2]; /* Where it starts. */
+    double direction[2]; /* Unit vector along it. */
 } blik_plane_ray;
 
 /* Where a ray of the plane meets a body first. Frozen: it does not grow. */
 typedef struct blik_plane_hit {
-    /* The point; (0, 0) where nothing is met. */
-    double point[2];
-    /* Unit normal of the front. */
-    double normal[2];
-    /* Circle or segment, counted over all bodies; BLIK_NO_FACET where nothing is met. */
-    uint32_t primitive;
-    /* 1 where its front is met. */
-    int32_t front;
+    double point[2]; /* The point; (0, 0) where nothing is met. */
+    double normal[2]; /* Unit normal of the front. */
+    uint32_t primitive; /* Circle or segment, counted over all bodies; BLIK_NO_FACET where nothing is met. */
+    int32_t front; /* 1 where its front is met. */
 } blik_plane_hit;
 
 /* The first circle or segment that each ray meets.
@@ -279,12 +245,9 @@ BLIK_API blik_status blik_plane_first_hits(const blik_plane_scene *scene, const 
 
 /* A part of what a point of the plane sees. Frozen: it does not grow. */
 typedef struct blik_plane_span {
-    /* Sine of the angle to the normal at which it begins, counter-clockwise positive. */
-    double from;
-    /* Sine at which it ends: half the difference is its form factor. */
-    double to;
-    /* The circle or segment that is seen, BLIK_NO_FACET for the sky. */
-    uint32_t primitive;
+    double from; /* Sine of the angle to the normal at which it begins, counter-clockwise positive. */
+    double to; /* Sine at which it ends: half the difference is its form factor. */
+    uint32_t primitive; /* The circle or segment that is seen, BLIK_NO_FACET for the sky. */
 } blik_plane_span;
 
 /* Bytes of scratch memory for blik_plane_visible, and the most spans that it finds.
@@ -356,20 +319,14 @@ BLIK_API void blik_plane_coupling_destroy(blik_plane_coupling *coupling);
 
 /* Numbers of a plane coupling. */
 typedef struct blik_plane_coupling_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Unknowns: rows. */
-    size_t unknowns;
-    /* Rows kept for each unknown: one for each number of reflections that is told apart. */
-    size_t classes;
-    /* Rows that see something of the object. */
-    size_t coupled_rows;
-    /* Rays traced. */
-    uint64_t rays;
+    size_t struct_size; /* Size of this struct. */
+    size_t unknowns; /* Unknowns: rows. */
+    size_t classes; /* Rows kept for each unknown: one for each number of reflections that is told apart. */
+    size_t coupled_rows; /* Rows that see something of the object. */
+    uint64_t rays; /* Rays traced. */
     /* Largest share of the brightest light that chains of a row could still have brought which were cut: a bound. */
     double dropped;
-    /* Bytes in use. */
-    size_t bytes;
+    size_t bytes; /* Bytes in use. */
 } blik_plane_coupling_info;
 
 /* Sets struct_size of a blik_plane_coupling_info. */
@@ -410,18 +367,13 @@ typedef double (*blik_plane_radiance_of)(void *user, double x, double y);
 
 /* The sky of a plane scene. */
 typedef struct blik_plane_sky {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Radiance from everywhere where radiance_of is null; default 1. */
-    double radiance;
+    size_t struct_size; /* Size of this struct. */
+    double radiance; /* Radiance from everywhere where radiance_of is null; default 1. */
     /* Radiance by direction; null (default): radiance. It must not throw, and is in use as long as the solution. */
     blik_plane_radiance_of radiance_of;
-    /* Handed to radiance_of. */
-    void *user;
-    /* Directions, two numbers each, at which radiance_of jumps or bends; copied. */
-    const double *jumps;
-    /* At most BLIK_PLANE_MAX_JUMPS. */
-    size_t jump_count;
+    void *user; /* Handed to radiance_of. */
+    const double *jumps; /* Directions, two numbers each, at which radiance_of jumps or bends; copied. */
+    size_t jump_count; /* At most BLIK_PLANE_MAX_JUMPS. */
 } blik_plane_sky;
 
 /* Sets the defaults of a blik_plane_sky: radiance 1 from everywhere. */
@@ -437,10 +389,8 @@ static inline void blik_plane_sky_init(blik_plane_sky *sky)
 
 /* A point sun of a plane scene. */
 typedef struct blik_plane_sun {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Toward the sun, of any length but zero; default (0, 1). */
-    double direction[2];
+    size_t struct_size; /* Size of this struct. */
+    double direction[2]; /* Toward the sun, of any length but zero; default (0, 1). */
     /* Irradiance of a surface that faces it, radiance times angle; default 2, which gives a white one the radiance 1. */
     double irradiance;
     /* The paper's cone: rays that leave the object after a mirror within this angle of the sun see it, radians up to
@@ -463,12 +413,9 @@ static inline void blik_plane_sun_init(blik_plane_sun *sun)
 
 /* The light of a plane scene. Read during the call only. */
 typedef struct blik_plane_light {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* The sky; null (default): none. */
-    const blik_plane_sky *sky;
-    /* The sun; null (default): none. */
-    const blik_plane_sun *sun;
+    size_t struct_size; /* Size of this struct. */
+    const blik_plane_sky *sky; /* The sky; null (default): none. */
+    const blik_plane_sun *sun; /* The sun; null (default): none. */
 } blik_plane_light;
 
 /* Sets the defaults of a blik_plane_light: none. */
@@ -524,16 +471,12 @@ BLIK_API void blik_plane_solution_destroy(blik_plane_solution *solution);
 
 /* Numbers of a plane solution. */
 typedef struct blik_plane_solution_info {
-    /* Size of this struct. */
-    size_t struct_size;
-    /* Contraction of a sweep over the linear system. */
-    double contraction;
+    size_t struct_size; /* Size of this struct. */
+    double contraction; /* Contraction of a sweep over the linear system. */
     /* Bound on the solver's error of all radiances: certain where the contraction is below 1, else by the sweeps' decay. */
     double solver_error;
-    /* Sweeps made. */
-    uint32_t sweeps;
-    /* Bytes in use. */
-    size_t bytes;
+    uint32_t sweeps; /* Sweeps made. */
+    size_t bytes; /* Bytes in use. */
 } blik_plane_solution_info;
 
 /* Sets struct_size of a blik_plane_solution_info. */
@@ -552,14 +495,10 @@ BLIK_API blik_status blik_plane_solution_get_info(const blik_plane_solution *sol
 
 /* An unknown of a plane solution. Frozen: it does not grow. */
 typedef struct blik_plane_unknown {
-    /* Where it stands. */
-    double point[2];
-    /* Unit normal of the surface there. */
-    double normal[2];
-    /* Diffuse radiance without the sun's direct part. */
-    double radiance;
-    /* Circle or segment, counted over all bodies. */
-    uint32_t primitive;
+    double point[2]; /* Where it stands. */
+    double normal[2]; /* Unit normal of the surface there. */
+    double radiance; /* Diffuse radiance without the sun's direct part. */
+    uint32_t primitive; /* Circle or segment, counted over all bodies. */
 } blik_plane_unknown;
 
 /* Unknowns of a plane solution.
@@ -579,14 +518,11 @@ BLIK_API blik_status blik_plane_get_unknowns(const blik_plane_solution *solution
 typedef struct blik_plane_sample {
     /* Place of an image's sample, along the direction that is clockwise of the view; 0 of blik_plane_radiance. */
     double abscissa;
-    /* Radiance: the sky's where nothing is met. */
-    double radiance;
+    double radiance; /* Radiance: the sky's where nothing is met. */
     /* Bound on the light that chains could still have brought which were cut, as a share of the brightest. */
     double chain_tail;
-    /* Rays traced. */
-    uint32_t rays;
-    /* 1 where the ray meets the object. */
-    int32_t object;
+    uint32_t rays; /* Rays traced. */
+    int32_t object; /* 1 where the ray meets the object. */
 } blik_plane_sample;
 
 /* Bytes of scratch memory with which blik_plane_image and blik_plane_radiance keep all lanes of run busy.
@@ -635,14 +571,10 @@ BLIK_API blik_status blik_plane_radiance(const blik_plane_solution *solution, co
 typedef struct blik_plane_lobe {
     /* Share of light from everywhere that it mirrors toward the view: 1 at normal view, 1/2 at grazing. */
     double albedo;
-    /* Its value per radian at the angle from the mirror direction. */
-    double value;
-    /* Width of a top hat of its peak and visible energy, radians. */
-    double equivalent_width;
-    /* Mean of the albedo over the angle of incidence. */
-    double mean_albedo;
-    /* Mean of the albedo weighed by the cosine. */
-    double cosine_mean_albedo;
+    double value; /* Its value per radian at the angle from the mirror direction. */
+    double equivalent_width; /* Width of a top hat of its peak and visible energy, radians. */
+    double mean_albedo; /* Mean of the albedo over the angle of incidence. */
+    double cosine_mean_albedo; /* Mean of the albedo weighed by the cosine. */
 } blik_plane_lobe;
 
 /* The lobe of a glossy material of the plane.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The headers, by file name.
-pub const HEADERS: [&str; 3] = ["blik.h", "blik_form_factor.h", "blik_plane.h"];
+pub const HEADERS: [&str; 4] = ["blik.h", "blik_lights.h", "blik_form_factor.h", "blik_plane.h"];
 
 /// Columns of a line.
 const COLUMNS: usize = 120;
@@ -129,12 +129,7 @@ impl Items {
         for name in names {
             let item = self.take(&name);
             let line = format!("    {name} = {},", item.code.split_whitespace().last().unwrap());
-            let comment = block(&item.comment, "");
-            if comment.lines().count() == 1 && line.len() + 1 + comment.trim_end().len() <= COLUMNS {
-                text += &format!("{line} {comment}");
-            } else {
-                text += &format!("{}{line}\n", block(&item.comment, "    "));
-            }
+            text += &described(&line, &item.comment);
         }
         match of {
             // 32 bits wide whatever the compiler's options
@@ -293,7 +288,7 @@ fn complete(function: &str, comment: &mut Vec<String>, arguments: &[String]) {
     }
 }
 
-/// A struct whose members have their comments on one line where they fit.
+/// A struct whose members have their comments behind them where they fit, else above.
 fn members(code: &str) -> String {
     let (mut text, mut comment, mut inside) = (String::new(), Vec::new(), false);
     for line in code.lines() {
@@ -302,13 +297,22 @@ fn members(code: &str) -> String {
             inside = true;
         } else if trimmed == "*/" {
             inside = false;
-            text += &block(&for_c(std::mem::take(&mut comment)), "    ");
         } else if inside {
             comment.push(trimmed.trim_start_matches('*').trim_start().to_string());
         } else {
-            text += &if line.contains('{') { line.to_string() } else { line.replace("struct ", "") };
-            text.push('\n');
+            let line = if line.contains('{') { line.to_string() } else { line.replace("struct ", "") };
+            text += &described(&line, &for_c(std::mem::take(&mut comment)));
         }
     }
     text
+}
+
+/// A member of an enum or struct with its comment: behind it where both fit on one line, else above.
+fn described(line: &str, comment: &[String]) -> String {
+    let text = block(comment, "");
+    if text.lines().count() == 1 && line.len() + 1 + text.trim_end().len() <= COLUMNS {
+        format!("{line} {text}")
+    } else {
+        format!("{}{line}\n", block(comment, "    "))
+    }
 }
