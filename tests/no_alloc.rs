@@ -12,7 +12,7 @@ use blik_kernel::base::budget::ErrorBudget;
 use blik_kernel::beam::{self, BeamSettings};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput, Sampling};
-use blik_kernel::coupling::rows::{self, RowSettings};
+use blik_kernel::coupling::rows::{self, CouplingRows, RowSettings};
 use blik_kernel::coupling::{Block, Coupling, row_builder};
 use blik_kernel::element::Elements;
 use blik_kernel::image::{self, Target};
@@ -201,7 +201,11 @@ fn coupling_and_beams_refuse_memory_that_holds_no_row() {
         let (scene, elements, n) = (system.scene, system.elements, system.elements.unknowns());
         let beams = BeamSettings::new(scene, system.light.sun.as_ref().unwrap(), 1000.0, 1e-3, 10);
         let mut fills: [Box<Fill<'_>>; 2] = [
-            Box::new(|memory| rows::fill(scene, bvh, elements, &PlaneSides::NONE, settings, 0..n, memory)),
+            Box::new(|memory| {
+                let plane_sides = &PlaneSides::NONE;
+                let of = CouplingRows { scene, bvh, elements, plane_sides, rows: *settings, kept: None };
+                rows::fill(&of, 0..n, memory)
+            }),
             Box::new(|memory| {
                 let (sun, facets) = (system.light.sun.as_ref().unwrap(), scene.facets());
                 beam::fill(scene, bvh, elements, sun, &beams, 0..facets, memory)

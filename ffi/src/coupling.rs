@@ -304,7 +304,7 @@ fn build(
     let elements = elements(base, &plane_sides, settings, runner, &mut cutter)?;
     let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
     let (bvh, scene) = (&base.bvh, &base.scene);
-    let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows };
+    let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows, kept: None };
     let places = table(&mut cutter, rows.places(), BlockPlace::default())?;
     let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
     let size = cutter.size.saturating_sub(room);
@@ -510,7 +510,8 @@ mod owned {
         let elements = Elements::new(&base.scene, &cut, unsafe { own.bytes_mut() })?;
         let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
         let (bvh, scene) = (&base.bvh, &base.scene);
-        let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows };
+        let rows =
+            CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows, kept: None };
         let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
         rows.fill(&mut pieces, runner)?;
         let mut slabs: Vec<Slab> = pieces.into_iter().flat_map(|piece| piece.blocks).collect();

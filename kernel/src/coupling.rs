@@ -10,6 +10,7 @@ pub mod cluster;
 pub(crate) mod detail;
 pub mod element;
 mod exact;
+pub mod kept;
 pub mod mirror_path;
 pub mod pack;
 pub mod plane_sides;
@@ -366,6 +367,11 @@ impl<'m> RowView<'m> {
     #[inline(always)]
     pub fn depth(&self, path: u16) -> u32 {
         self.paths.get(path as usize).map_or(0, |w| w.depth)
+    }
+
+    /// The path of a number.
+    fn path(&self, path: u16) -> MirrorPath {
+        self.paths.at(path as usize)
     }
 }
 

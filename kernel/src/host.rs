@@ -8,6 +8,7 @@ mod lights;
 mod report;
 mod rounds;
 mod run;
+mod update;
 
 pub use lights::{Explanation, LightReport, Wanted};
 pub use report::*;
@@ -132,6 +133,8 @@ pub struct Geometry<'s> {
     settings: settings::Settings,
     /// The caller's reference radiance.
     reference: Option<Vec<f64>>,
+    /// As [`Settings::memory_budget`].
+    memory_budget: Option<usize>,
     /// Rays of the coupling.
     rays: u64,
     report: Report,
@@ -264,33 +267,24 @@ impl Host {
         let elements = Elements::new(&scene, &cut, element_memory.bytes_mut())?;
         report.elements = elements.count();
         let rows = settings.rows_within(&scene, elements.unknowns());
-        let rows =
-            CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides: &plane_sides, rows };
-        let blocks = match memory_budget {
-            None => {
-                let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
-                rows.fill(&mut pieces, &mut run)?;
-                *slabs = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
-                slabs.iter().map(|s| Block::open(s.bytes())).collect::<Result<Vec<_>, _>>()?
-            }
-            Some(bytes) => {
-                let mut slab = Memory::new(bytes);
-                let mut places = std::vec![BlockPlace::default(); rows.places()];
-                let (places, end) = rows.fill_in(slab.bytes_mut(), &mut places, true, &mut run)?;
-                slab.truncate(end);
-                *slabs = std::vec![slab];
-                let memory = slabs.first().map_or(&[][..], Memory::bytes);
-                places.iter().map(|place| place.open(memory)).collect::<Result<Vec<_>, _>>()?
-            }
+        let rows = CouplingRows {
+            scene: &scene,
+            bvh: &bvh,
+            elements: &elements,
+            plane_sides: &plane_sides,
+            rows,
+            kept: None,
         };
+        let blocks = blocks(&rows, memory_budget, slabs, &mut run)?;
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
         let rays = coupling.rays();
         report.rays.visibility += rays;
+        report.rows.redone = elements.unknowns() as u64;
         report.count_rows(&coupling);
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
-        Ok(Geometry { scene, bvh, elements, blocks, settings, reference, rays, report })
+        Ok(Geometry { scene, bvh, elements, blocks, settings, reference, memory_budget, rays, report })
     }
 
     /// The light of a scene, solved: no visibility is computed again.
@@ -589,6 +583,28 @@ fn signature_report(light: &Light<'_>, reference: &[f64], forward: Vec3, sums: &
         error: (0..bands).map(|b| of(b).error).collect(),
         unresolved_glints: (0..bands).map(|b| of(b).unresolved).collect(),
     }
+}
+
+/// Computes all rows, in memory that `slabs` keeps: as much as they need, or within a budget.
+fn blocks<'s>(
+    rows: &CouplingRows<'_>,
+    memory_budget: Option<usize>,
+    slabs: &'s mut Vec<Memory>,
+    run: &mut Run<'_>,
+) -> Result<Vec<Block<'s>>, Error> {
+    let Some(bytes) = memory_budget else {
+        let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
+        rows.fill(&mut pieces, run)?;
+        *slabs = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
+        return slabs.iter().map(|s| Block::open(s.bytes())).collect();
+    };
+    let mut slab = Memory::new(bytes);
+    let mut places = std::vec![BlockPlace::default(); rows.places()];
+    let (places, end) = rows.fill_in(slab.bytes_mut(), &mut places, true, run)?;
+    slab.truncate(end);
+    *slabs = std::vec![slab];
+    let memory = slabs.first().map_or(&[][..], Memory::bytes);
+    places.iter().map(|place| place.open(memory)).collect()
 }
 
 /// Memory of one piece's blocks, each of its own.

@@ -318,6 +318,14 @@ impl<'m> Scene<'m> {
         self.scale
     }
 
+    /// Whether another scene has the same facets, at the same places and of the same mirror directions.
+    pub fn has_mesh_of(&self, other: &Scene<'_>) -> bool {
+        let placed = |s: &Scene<'_>| (s.lowest, s.half, s.scale, s.sides, s.bands);
+        placed(self) == placed(other)
+            && self.corners == other.corners
+            && self.corner_normals == other.corner_normals
+    }
+
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         self.memory

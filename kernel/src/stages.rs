@@ -11,12 +11,15 @@ mod light;
 mod lights;
 mod solve;
 mod straight;
+mod update;
 
+pub use crate::coupling::rows::CouplingRows;
 pub use adjoint::{AdjointMemory, AdjointReport};
 pub use beams::Beams;
-pub use geometry::{BlockMemory, BlockPlace, CouplingRows, least_bytes, places, refine};
+pub use geometry::{BlockMemory, BlockPlace, least_bytes, places, refine};
 pub use light::{Lighting, Scratch, Sizes};
 pub use lights::{Alone, Explained, KeptSky, Lights};
+pub use update::{UpdateMemory, judge};
 
 use crate::base::error::Error;
 use core::num::NonZeroUsize;

@@ -228,8 +228,14 @@ pub fn run(
     let elements = Elements::new(&scene, &cut, &mut work.elements[..bytes])?;
     counts.unknowns = elements.unknowns();
     let rows = asked.rows(&scene);
-    let rows =
-        CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides: &plane_sides, rows };
+    let rows = CouplingRows {
+        scene: &scene,
+        bvh: &bvh,
+        elements: &elements,
+        plane_sides: &plane_sides,
+        rows,
+        kept: None,
+    };
     let places = &mut work.places[..rows.places()];
     let (places, end) = rows.fill_in(work.blocks.bytes_mut(), places, false, &mut run)?;
     let mut blocks = [Block::EMPTY; BLOCKS];

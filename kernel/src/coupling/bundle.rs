@@ -15,6 +15,9 @@ use core::cmp::Ordering;
 /// Words of a bundle's head: count, path, weight (2), gradient (2), half differences (4).
 const HEAD: usize = 10;
 
+/// The word of a head that holds the path.
+const PATH_WORD: usize = 1;
+
 /// Words of a record.
 const RECORD_WORDS: usize = size_of::<Record>() / size_of::<u32>();
 
@@ -61,6 +64,23 @@ impl<'m> Bundles<'m> {
     #[inline(always)]
     pub fn new(records: &'m [Record]) -> Bundles<'m> {
         Bundles(arena::words(records))
+    }
+
+    /// Records' worth of room.
+    pub(super) fn room(self) -> usize {
+        self.0.len() / RECORD_WORDS
+    }
+
+    /// Copies them to as many records, the paths by `path`; `None` where that says so.
+    pub(super) fn copy(self, to: &mut [Record], mut path: impl FnMut(u16) -> Option<u16>) -> Option<()> {
+        let (all, to) = (self.0.len(), arena::words_mut(to));
+        copy(to, self.0);
+        let mut rest = self;
+        loop {
+            let at = all - rest.0.len();
+            let Some(bundle) = rest.next() else { return Some(()) };
+            to.set(at + PATH_WORD, u32::from(path(bundle.path)?));
+        }
     }
 
     /// Words that belong to no bundle: zeros, where all is sound.

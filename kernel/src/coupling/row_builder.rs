@@ -1,7 +1,8 @@
 //! Writes rows of records into a block of caller memory.
 
+use super::kept::Kept;
 use super::mirror_path::{MirrorPath, MirrorPaths, STRAIGHT};
-use super::{BLOCKED, ENCLOSED, Head, Record, Row, bundle};
+use super::{BLOCKED, ENCLOSED, Head, Record, Row, RowView, bundle};
 use crate::base::arena::{ALIGNMENT, Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -174,6 +175,26 @@ impl<'m> RowBuilder<'m> {
         self.used = self.start;
     }
 
+    /// Adds a row of another coupling as it is, its paths by their classes now; `None` where the memory is full.
+    pub(super) fn copy_row(&mut self, row: &RowView<'_>, kept: &Kept<'_>, scene: &Scene<'_>) -> Option<()> {
+        let mut known = [(STRAIGHT, STRAIGHT); PATHS_KNOWN];
+        let paths = &mut self.paths;
+        let mut path = |old: u16| carry(paths, (row, kept, scene), old, &mut known);
+        for record in row.targets {
+            let key = record.key & !u64::from(u16::MAX) | u64::from(path(record.path())?);
+            *self.records.get_mut(self.used)? = Record { key, ..*record };
+            self.used += 1;
+        }
+        let escapes = self.used;
+        let end = escapes + row.escapes.room();
+        row.escapes.copy(self.records.get_mut(escapes..end)?, path)?;
+        self.used = end;
+        self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..row.row });
+        self.done += 1;
+        self.start = self.used;
+        Some(())
+    }
+
     /// Ends the block and returns the number of rows in it.
     pub fn end(self) -> usize {
         if let Some(end) = self.rows.get_mut(self.done) {
@@ -184,6 +205,40 @@ impl<'m> RowBuilder<'m> {
         self.head.paths = self.paths.used() as u64;
         self.done
     }
+}
+
+/// Paths of a copied row that are remembered: rows name the same few again and again.
+const PATHS_KNOWN: usize = 64;
+
+/// The path in `paths` that a copied row's becomes, all of whose mirrors are by their classes now; `None` where the table is
+/// full. `known` holds paths of the row and what they became.
+fn carry(
+    paths: &mut MirrorPaths<'_>,
+    (row, kept, scene): (&RowView<'_>, &Kept<'_>, &Scene<'_>),
+    path: u16,
+    known: &mut [(u16, u16)],
+) -> Option<u16> {
+    if matches!(path, STRAIGHT | BLOCKED) {
+        return Some(path);
+    }
+    let (mut at, mut steps) = (path, 0);
+    let mut new = loop {
+        let (old, new) = known.at(at as usize % PATHS_KNOWN);
+        if old == at {
+            break new;
+        }
+        (at, steps) = (row.path(at).parent, steps + 1);
+        if at == STRAIGHT {
+            break STRAIGHT;
+        }
+    };
+    for back in (0..steps).rev() {
+        // links lead from the last mirror to the first
+        let at = (0..back).fold(path, |at, _| row.path(at).parent);
+        new = paths.push(new, kept.class(row.path(at).class), scene)?;
+        known.set(at as usize % PATHS_KNOWN, (at, new));
+    }
+    Some(new)
 }
 
 /// Adds up neighbours that are the same and returns how many records are left. Their weights are summed with what each

@@ -15,6 +15,7 @@
 //! body, and counts or not.
 
 use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
+use super::kept::Kept;
 use super::mirror_path::{MIRRORS_MOST, STRAIGHT};
 use super::row_builder::RowBuilder;
 use super::{BLOCKED, ENCLOSED, OPEN, Record, Row, TRACED};
@@ -172,20 +173,30 @@ impl RowSettings {
     }
 }
 
+/// The rows of a coupling that is to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct CouplingRows<'a> {
+    /// The scene.
+    pub scene: &'a Scene<'a>,
+    /// Its tree.
+    pub bvh: &'a Bvh<'a>,
+    /// Its elements.
+    pub elements: &'a Elements<'a>,
+    /// Its facets' planes.
+    pub plane_sides: &'a PlaneSides<'a>,
+    /// How rows are computed.
+    pub rows: RowSettings,
+    /// Rows that are copied.
+    pub kept: Option<Kept<'a>>,
+}
+
 /// Computes the rows of `range`, or as many of them as `memory` holds, and returns how many; the caller hands
 /// the rest to another block. At least one row, or [`Error::BufferTooSmall`].
 ///
 /// The numbers of a row depend neither on the range nor on the memory.
-pub fn fill(
-    scene: &Scene<'_>,
-    bvh: &Bvh<'_>,
-    elements: &Elements<'_>,
-    plane_sides: &PlaneSides<'_>,
-    settings: &RowSettings,
-    range: Range<usize>,
-    memory: &mut [u8],
-) -> Result<usize, Error> {
-    let given = memory.len();
+pub fn fill(of: &CouplingRows<'_>, range: Range<usize>, memory: &mut [u8]) -> Result<usize, Error> {
+    let (CouplingRows { scene, bvh, elements, plane_sides, rows: settings, kept }, given) =
+        (of, memory.len());
     // the set of what is clear stands behind the block
     let words = if plane_sides.is_empty() || settings.directional { 0 } else { ProvenVisible::words(scene) };
     let room = if words > 0 { Need::new().and::<u64>(words).bytes()? } else { 0 };
@@ -200,7 +211,12 @@ pub fn fill(
     let mean_area = scene.areas().iter().sum::<f64>().max(f64::MIN_POSITIVE) / elements.roots() as f64;
     let mut tracer = Tracer { scene, bvh, elements, plane_sides, settings, mean_area, builder, proven };
     for unknown in range {
-        if tracer.row(unknown).is_none() {
+        let row = kept.as_ref().and_then(|kept| Some((kept.row(unknown)?, kept)));
+        let done = match row {
+            Some((row, kept)) => tracer.builder.copy_row(&row, kept, scene),
+            None => tracer.row(unknown),
+        };
+        if done.is_none() {
             tracer.builder.drop_row();
             break;
         }

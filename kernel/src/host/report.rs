@@ -1,6 +1,7 @@
 //! The report that comes with every result: its estimated error, the work done, what was left out.
 
 use crate::base::budget::ErrorBudget;
+use crate::coupling::kept::Fates;
 use crate::coupling::{ABSENT, Coupling, OPEN};
 use crate::scene::Scene;
 use crate::scene::light::Light;
@@ -36,6 +37,8 @@ pub struct Report {
     pub bands: usize,
     pub elements: usize,
     pub pairs: Pairs,
+    /// What became of the coupling's rows; without [`super::Host::update`] all were computed.
+    pub rows: Fates,
     pub rays: Rays,
     pub sweeps: u32,
     pub bytes: Bytes,

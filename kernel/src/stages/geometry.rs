@@ -5,10 +5,9 @@ use super::{Count, Executor, LANES_MOST, block_rows};
 use crate::base::arena::{ALIGNMENT, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
-use crate::coupling::element::Elements;
 use crate::coupling::pack::{move_down, pack};
 use crate::coupling::plane_sides::PlaneSides;
-use crate::coupling::rows::{RowSettings, fill};
+use crate::coupling::rows::{CouplingRows, RowSettings, fill};
 use crate::coupling::subdivide::SubdivisionTree;
 use crate::coupling::{Block, row_builder};
 use crate::rays::bvh::Bvh;
@@ -48,21 +47,6 @@ pub fn refine<X: Executor>(
     }
 }
 
-/// The rows of a coupling that is to be made.
-#[derive(Clone, Copy, Debug)]
-pub struct CouplingRows<'a> {
-    /// The scene.
-    pub scene: &'a Scene<'a>,
-    /// Its tree.
-    pub bvh: &'a Bvh<'a>,
-    /// Its elements.
-    pub elements: &'a Elements<'a>,
-    /// Its facets' planes.
-    pub plane_sides: &'a PlaneSides<'a>,
-    /// How rows are computed.
-    pub rows: RowSettings,
-}
-
 /// Memory in which blocks of rows stand one after the other.
 pub trait BlockMemory: Send {
     /// Lends memory for one block, on a boundary of [`ALIGNMENT`]: `bytes`, or fewer where no more is left.
@@ -97,7 +81,7 @@ impl CouplingRows<'_> {
 
     /// Computes rows of `range` in order, until all are done or the memory is full.
     fn fill_range(&self, range: Range<usize>, memory: &mut impl BlockMemory) -> Result<(), Error> {
-        let CouplingRows { scene, bvh, elements, plane_sides, rows } = self;
+        let CouplingRows { scene, elements, rows, .. } = self;
         let piece = block_rows(elements.unknowns());
         let (mut next, mut records, mut unmerged) = (range.start, LEAST_RECORDS, settings::unmerged(rows));
         while next < range.end {
@@ -105,7 +89,7 @@ impl CouplingRows<'_> {
             let wanted = row_builder::bytes(until - next, records, unmerged, scene.bands())?;
             let wanted = wanted.next_multiple_of(ALIGNMENT);
             let block = memory.lend(wanted)?;
-            match fill(scene, bvh, elements, plane_sides, rows, next..until, block) {
+            match fill(self, next..until, block) {
                 Ok(done) => {
                     next += done;
                     records = LEAST_RECORDS.max(Block::open(block)?.records() / done.max(1) + 16);
