@@ -43,7 +43,8 @@ impl LightArray {
         Ok(LightArray { start: all.as_ptr(), count, stride })
     }
 
-    /// One of the lights, checked. An error tells its number as `index`; where it is about a facet's emission, as `given`.
+    /// What one of the lights is made from. An error tells its number as `index`; where it is about a facet's emission, as
+    /// `given`.
     ///
     /// # Safety
     /// The pointers of the lights are null or valid.
@@ -51,6 +52,19 @@ impl LightArray {
         let at = self.start.wrapping_add(number * self.stride).cast::<blik_light>();
         // SAFETY: below `count`; by the caller's promise.
         unsafe { given_light(at, &coupling.base.scene) }.map_err(|error| of_light(error, number))
+    }
+
+    /// One of the lights, checked. Errors are as for [`LightArray::get`].
+    ///
+    /// # Safety
+    /// As for [`LightArray::get`].
+    // apart: what it is made from does not burden the stack of solving
+    #[inline(never)]
+    unsafe fn light(&self, number: usize, coupling: &blik_coupling) -> Result<Light<'_>, blik_error> {
+        // SAFETY: by the caller's promise.
+        let input = &unsafe { self.get(number, coupling) };
+        let light = input.as_ref().map_err(|error| *error)?.light(&coupling.base.scene);
+        light.map_err(|error| of_light(error.into(), number))
     }
 }
 
@@ -82,7 +96,7 @@ unsafe fn light_lane(coupling: &blik_coupling, lights: &LightArray) -> Result<us
     let mut most = 0;
     for number in 0..lights.count {
         // SAFETY: by the caller's promise.
-        let light = unsafe { lights.get(number, coupling) }?.light(&coupling.base.scene)?;
+        let light = unsafe { lights.light(number, coupling) }?;
         most = most.max(all.bytes(&light)?);
     }
     let one = most.next_multiple_of(ALIGNMENT).checked_add(lane_bytes()? + ALIGNMENT);
@@ -245,30 +259,36 @@ fn solve_all(
         // SAFETY: a lane's memory is used by that lane alone; the lights are the caller's promise.
         let (memory, light) = unsafe {
             let memory = core::slice::from_raw_parts_mut(start.at(lane_number * lane), lane);
-            (memory, &lights.get(number, coupling))
+            (memory, &lights.light(number, coupling))
         };
+        // in one place of the stack: it is large
         let light = light.as_ref().map_err(|error| *error)?;
-        let views = lane_bytes()?;
-        let (memory, scratch) = memory.split_at_mut_checked(lane - views).unwrap_or_default();
-        solve_one(&all, coupling, (number, light), out, memory, scratch)
-            .map_err(|error| of_light(error, number))
+        let (memory, scratch) = memory.split_at_mut_checked(lane - lane_bytes()?).unwrap_or_default();
+        let of_light = |error| of_light(error, number);
+        // SAFETY: by the caller's promise.
+        let solution = unsafe { solve_one(&all, coupling, lights, (number, light), memory) };
+        let solution = solution.as_ref().map_err(|error| of_light(*error))?;
+        put_light(&all, coupling, (number, light), solution, out, scratch).map_err(of_light)
     })
 }
 
-/// Solves one light and writes what is wanted of it.
-fn solve_one(
+/// Solves one light.
+///
+/// # Safety
+/// As for [`LightArray::get`].
+// apart: what the light is made from does not burden the stack of its views
+#[inline(never)]
+unsafe fn solve_one<'m>(
     all: &Lights<'_>,
     coupling: &blik_coupling,
-    (number, input): (usize, &LightInput<'_>),
-    out: &LightOutputs,
-    memory: &mut [u8],
-    scratch: &mut [u8],
-) -> Result<(), blik_error> {
-    // in one place of the stack: it is large
-    let light = input.light(all.scene);
-    let light = light.as_ref().map_err(|error| *error)?;
-    let solution = all.solve(input, light, None, memory)?;
-    put_light(all, coupling, (number, light), &solution, out, scratch)
+    lights: &LightArray,
+    (number, light): (usize, &Light<'_>),
+    memory: &'m mut [u8],
+) -> Result<Solution<'m>, blik_error> {
+    // SAFETY: by the caller's promise.
+    let input = &unsafe { lights.get(number, coupling) };
+    let input = input.as_ref().map_err(|error| *error)?;
+    Ok(all.solve(input, light, None, memory)?)
 }
 
 /// Writes what is wanted of a solved light.

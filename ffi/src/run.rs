@@ -233,6 +233,8 @@ impl Job<'_> {
         }
     }
 
+    // apart: does not burden the stack of the items
+    #[inline(never)]
     fn fail(&self, item: usize, error: blik_error) {
         self.stop.store(true, Ordering::Relaxed);
         self.failed.with(|first| {

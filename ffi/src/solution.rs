@@ -121,7 +121,8 @@ unsafe fn given_sky<'a>(sky: *const blik_sky, bands: usize) -> Result<Option<Sky
     record.input(radiance, ground, samples).ok_or(choice).map(Some)
 }
 
-/// The caller's light, checked; its arrays are still the caller's.
+/// What the caller's light is made from: pointers and lengths are checked, values are not (`LightInput::light` does); its arrays
+/// are still the caller's.
 ///
 /// # Safety
 /// As for [`given_sky`].
@@ -162,9 +163,7 @@ pub(crate) unsafe fn given_light<'a>(
     }
     // SAFETY: by the caller's promise.
     let emission = unsafe { input(light.emission, light.emission_count) }?;
-    let given = LightInput { sky, sun, emission, reference };
-    given.light(scene)?;
-    Ok(given)
+    Ok(LightInput { sky, sun, emission, reference })
 }
 
 /// Counts of a solution's values and bytes.

@@ -296,7 +296,7 @@ fn paint(
         let size = range.len() * stride;
         // SAFETY: every item is handed out once, so that parts of the image are disjoint; a lane's buffer is used by
         // that lane alone, and there are as many tallies as items.
-        unsafe {
+        let done = unsafe {
             let own = |start: &Start<f32>, size| {
                 let at = if size > 0 { range.start * stride } else { 0 };
                 core::slice::from_raw_parts_mut(start.at(at), size)
@@ -305,9 +305,12 @@ fn paint(
             let components = parts.each_ref().map(|start| own(start, part));
             let mut target = Target { image: own(&pixels, size), components };
             let buffer = core::slice::from_raw_parts_mut(buffers.at(lane * lane_size), lane_size);
-            let tally = image::prepared_rows(&solved, camera, range, &mut target, buffer)?;
-            tallies.at(item).write(tally);
-        }
+            image::prepared_rows(&solved, camera, range, &mut target, buffer)
+        };
+        // where it stands: it is large
+        let tally = done.as_ref().map_err(|error| *error)?;
+        // SAFETY: as above.
+        unsafe { tallies.at(item).write(*tally) };
         Ok(())
     })?;
     let mut sum = Tally::default();
@@ -353,7 +356,9 @@ pub unsafe extern "C" fn blik_image_rows(
         // SAFETY: by the caller's promise.
         let solution: &blik_solution = unsafe { object(solution) }?;
         // SAFETY: by the caller's promise.
-        let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
+        let camera = &unsafe { self::camera(camera, &solution.coupling.base.scene) };
+        // in one place of the stack: it is large
+        let camera = camera.as_ref().map_err(|error| *error)?;
         let bands = solution.record.shape.bands;
         let range = rows_of(first, rows, camera.rows())?;
         let expected = rows * camera.columns() * bands;
@@ -363,10 +368,10 @@ pub unsafe extern "C" fn blik_image_rows(
             (out, Place::optional(tally)?)
         };
         let mut target = Target { image: out.pixels, components: out.components };
-        let wanted = image::scratch_bytes(&camera, bands)?;
+        let wanted = image::scratch_bytes(camera, bands)?;
         let mut solved = solution.solved();
-        image::prepare(&mut solved, &camera);
-        let work = |given: &mut [u8]| Ok(image::prepared_rows(&solved, &camera, range, &mut target, given)?);
+        image::prepare(&mut solved, camera);
+        let work = |given: &mut [u8]| Ok(image::prepared_rows(&solved, camera, range, &mut target, given)?);
         // SAFETY: by the caller's promise.
         let sum = unsafe { with_scratch(scratch, scratch_size, wanted, work) }?;
         if let Some(to) = tally {

@@ -69,12 +69,12 @@ impl Settings {
 
     /// How far specular chains are followed, and on which elements final gathering is used: an image may take as many for
     /// that as another round of a coupling that took `rays`.
-    pub fn chains(&self, rays: u64) -> ChainSettings {
+    pub fn chains(&self, rays: u64) -> ChainSettings<'_> {
         let ErrorBudget { solution, image, gathering, .. } = self.budget;
         let growth = (solution / image) * (solution / image);
         let finer = if solution > image { COARSE_GROWTH } else { ROUND_GROWTH };
         ChainSettings {
-            budget: self.budget,
+            budget: &self.budget,
             max_bounces: self.max_bounces,
             gather: gathering,
             rays: (rays as f64 * finer * growth) as u64,

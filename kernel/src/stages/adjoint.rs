@@ -70,6 +70,8 @@ impl Lighting<'_> {
     /// reflections. `scratch` is as [`Lighting::solve`] left it, with the radiances of its first pass kept ([`super::Sizes::keeping_first`]).
     ///
     /// The derivative is that of the numbers that the solver's equations define: elements, rows and rays stay what they are.
+    // apart on small machines: does not burden the stack of the signature
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     pub fn differentiate(
         &self,
         solution: &Solution<'_>,

@@ -256,7 +256,7 @@ impl Lights<'_> {
         (input, light): (&LightInput<'_>, &Light<'_>),
         given: Option<&[f64]>,
         (views, cells): (&[[f64; 3]], usize),
-        chains: ChainSettings,
+        chains: ChainSettings<'_>,
         memory: &mut [u8],
         mut each: impl FnMut(usize, &Explained<'_>) -> Result<(), Error>,
     ) -> Result<(), Error> {
@@ -299,9 +299,9 @@ fn explain_view(
 ) -> Result<(), Error> {
     let (scene, elements) = (solved.scene, solved.elements);
     let mut importance = Importance::take(scene, elements, &mut Arena::new(first, 0)?)?;
-    let mut adjoint = AdjointMemory::take(elements.unknowns(), solved.shape, &mut Arena::new(second, 0)?)?;
     let view = View::new(solved, forward, cells)?;
     let sums = signature::explained(solved, &view, third, &mut importance)?;
+    let mut adjoint = AdjointMemory::take(elements.unknowns(), solved.shape, &mut Arena::new(second, 0)?)?;
     let report = lighting.differentiate(&solved.solution, scratch, &mut importance, &mut adjoint)?;
     each(&Explained { solved, sums, importance: &importance, report })
 }

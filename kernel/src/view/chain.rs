@@ -34,9 +34,9 @@ use occluders::RayKind;
 
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChainSettings {
+pub struct ChainSettings<'a> {
     /// The wanted errors and their shares.
-    pub budget: ErrorBudget,
+    pub budget: &'a ErrorBudget,
     /// Light reflected more often does not count; `None`: by the budget alone.
     pub max_bounces: Option<u32>,
     /// Where an error above this many of the images' is expected of an element, rays from the point itself find what arrives
@@ -81,12 +81,12 @@ const GATHER_MANY: f64 = 0.6;
 /// Rays of final gathering that an image may take in any case: some tenths of a second.
 const IMAGE_RAYS_LEAST: f64 = 2e6;
 
-impl ChainSettings {
+impl ChainSettings<'_> {
     /// Settings for the images of a camera: where the rays suffice for all pixels that the object may fill, final
     /// gathering is used on all but the best elements. Clusters all have it: their
     /// means tell nothing of a point.
-    pub(crate) fn of_image(self, camera: &Camera, solved: &Solved<'_>) -> ChainSettings {
-        let ErrorBudget { solution, image, .. } = self.budget;
+    pub(crate) fn of_image(self, camera: &Camera, solved: &Solved<'_>) -> Self {
+        let ErrorBudget { solution, image, .. } = *self.budget;
         let (scene, reflected) = (solved.scene, solved.numbers.reflected);
         let all = camera.columns() * camera.rows();
         let spread = scene.largest_diffuse() * gather::spread(reflected);
@@ -111,14 +111,14 @@ impl ChainSettings {
     }
 
     /// Settings for single points: final gathering on all but the best elements, and all light that a facet receives.
-    pub(crate) fn of_points(self) -> ChainSettings {
+    pub(crate) fn of_points(self) -> Self {
         // the facet's own reflection is one more
         let max_bounces = self.max_bounces.map(|most| most.saturating_add(1));
         ChainSettings { gather: GATHER_ALL, max_bounces, ..self }
     }
 
     /// Settings for sums over many rays, in which errors of single elements count little: no final gathering.
-    pub(crate) fn of_sums(self) -> ChainSettings {
+    pub(crate) fn of_sums(self) -> Self {
         ChainSettings { gather: f64::INFINITY, apart: true, ..self }
     }
 }
@@ -137,7 +137,7 @@ pub struct Solved<'a> {
     /// The record of its solution.
     pub solution: Solution<'a>,
     /// How far chains are followed.
-    pub settings: ChainSettings,
+    pub settings: ChainSettings<'a>,
 }
 
 /// The record's fields, which every step of a chain reads.
@@ -465,7 +465,7 @@ impl Solved<'_> {
     /// The same, and notes what the radiance depends on: of rays that are each one of many ([`RaySample::Stratum`]).
     pub(crate) fn radiance_noted<'m>(
         &self,
-        (ray, hit): (&Ray, Option<Hit>),
+        (ray, mut hit): (&Ray, Option<Hit>),
         sample: RaySample,
         terms: &mut Terms,
         work: &mut ChainScratch,
@@ -490,7 +490,9 @@ impl Solved<'_> {
             onward: None,
         };
         let mode = &mut Mode { sample, occluders, branches: true, importance };
-        if let Some(lobe) = self.follow(&mut state, hit, mode, terms, &mut path) {
+        if self.follow(&mut state, &mut hit, mode, terms, &mut path)
+            && let Some(lobe) = &hit
+        {
             let mut samples = LobeSamples {
                 terms: sums,
                 path: Path::default(),
@@ -499,44 +501,44 @@ impl Solved<'_> {
                 throughput: next,
                 count: 0,
             };
-            self.branch(&mut state, &lobe, mode, terms, &mut path, &mut samples);
+            self.branch(&mut state, lobe, mode, terms, &mut path, &mut samples);
         }
         path
     }
 
     /// Follows a chain whose ray meets `hit` first to its end; or, where it may branch and the ray stands for itself, to
-    /// the first lobe. All other lobes take one ray.
+    /// the first lobe: true, and `hit` is there. All other lobes take one ray.
     fn follow(
         &self,
         state: &mut PathState<'_>,
-        mut hit: Option<Hit>,
+        hit: &mut Option<Hit>,
         mode: &mut Mode<'_, '_>,
         terms: &mut Terms,
         path: &mut Path,
-    ) -> Option<Hit> {
+    ) -> bool {
         loop {
             let Some(met) = hit else {
                 self.escape(state, terms);
                 path.chance = path.chance.max(self.chance(state));
-                return None;
+                return false;
             };
             path.object |= state.mirrors == 0;
             state.far += met.t;
             state.step = met.t;
             // where they stand: copies burden small stacks
-            let surface = &Surface::of_hit(self.scene, &met);
-            let surface = surface.as_ref()?;
+            let surface = &Surface::of_hit(self.scene, met);
+            let Some(surface) = surface else { return false };
             self.add_diffuse(state, surface, mode, terms, path);
             let mirror = &surface.mirror(self.scene);
-            let mirror = mirror.as_ref()?;
+            let Some(mirror) = mirror else { return false };
             if !self.advance(state, surface, terms, path) {
-                return None;
+                return false;
             }
             // where sunlight is found apart, the first mirror's is
             let apart = self.settings.apart && state.mirrors == 1;
             state.lobe = mirror.lobe.is_some()
                 || state.lobe && state.imaged && surface.flat_mirror(self.scene).is_some();
-            hit = match &mirror.lobe {
+            *hit = match &mirror.lobe {
                 None => {
                     if apart {
                         let imaged = !self.images.slots.is_empty() && self.knows_images(surface);
@@ -549,7 +551,7 @@ impl Solved<'_> {
                         self.add_sun_gloss(state, surface, mirror, mode, terms, path);
                     }
                     if !self.advance_lobe(state, surface, mirror, mode, path) {
-                        return Some(met);
+                        return true;
                     }
                     path.rays += 1;
                     self.bvh.closest(&state.ray)
@@ -726,12 +728,12 @@ impl Solved<'_> {
         let sample = RaySample::Stratum { seed: mode.sample.seed(), index: samples.count };
         let importance = mode.importance.as_deref_mut();
         let mut mode = Mode { sample, occluders: &mut *mode.occluders, branches: false, importance };
-        let hit = self.bvh.closest(&state.ray);
+        let mut hit = self.bvh.closest(&state.ray);
         let PathState { mirrors, lobes, far, imaged, .. } = *state;
         let gathered = state.gathered.take();
         state.lobe = true;
         core::mem::swap(&mut state.throughput, &mut samples.throughput);
-        self.follow(state, hit, &mut mode, samples.terms, &mut samples.path);
+        self.follow(state, &mut hit, &mut mode, samples.terms, &mut samples.path);
         core::mem::swap(&mut state.throughput, &mut samples.throughput);
         (state.mirrors, state.lobes, state.far, state.imaged, state.gathered) =
             (mirrors, lobes, far, imaged, gathered);

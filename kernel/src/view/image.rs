@@ -281,6 +281,16 @@ struct Painter<'a, 's> {
     tally: Tally,
 }
 
+/// How the centres of a pixel and of its eight neighbours differ.
+struct Neighbourhood {
+    /// Whether lobes or penumbrae are in one of them.
+    sampled: bool,
+    /// Sum of the steps along the three rows, relative to the reference radiance.
+    along: f64,
+    /// Sum of the steps down the three columns.
+    down: f64,
+}
+
 impl<'a, 's> Painter<'a, 's> {
     /// In scratch memory of [`scratch_bytes`]; rows from `end` on are not wanted.
     // apart on small machines: does not burden the stack of rays
@@ -418,7 +428,7 @@ impl<'a, 's> Painter<'a, 's> {
     /// row's root mean square to be a small part of the tolerance.
     #[inline(never)]
     fn goal(&mut self, row: isize, columns: isize) -> f64 {
-        let ErrorBudget { pixels, worst_pixel, .. } = self.solved.settings.budget;
+        let ErrorBudget { pixels, worst_pixel, .. } = *self.solved.settings.budget;
         let (mut object, mut uneven) = (0.0, 0.0);
         for j in 0..columns {
             let value = self.unevenness(row, j);
@@ -599,18 +609,7 @@ impl<'a, 's> Painter<'a, 's> {
         if self.solved.gathers() {
             self.gather_about_middle(row, column);
         }
-        let mut sampled = false;
-        let measure = self.measure();
-        let (mut along, mut down) = (0.0, 0.0);
-        for i in -1..=1 {
-            let centre =
-                |i: isize, j: isize| self.centre_rows.terms(self.centre_rows.place(row + i, column + j));
-            for j in -1..=1 {
-                sampled |= self.centre_rows.is_sampled(self.centre_rows.place(row + i, column + j));
-            }
-            along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
-            down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
-        }
+        let Neighbourhood { sampled, along, down } = self.neighbourhood(row, column);
         let contrast = along.max(down);
         let steep = contrast > SCATTER_CONTRAST_MOST * goal;
         // scattered rays are few, and may all miss what is thin
@@ -623,6 +622,25 @@ impl<'a, 's> Painter<'a, 's> {
         }
         let contrast = if thin { 1.0 } else { contrast };
         self.scatter(target, index, (row, column), contrast, goal)
+    }
+
+    /// How the centres about a pixel differ.
+    // apart on small machines: does not burden the stack of the pixel's rays
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn neighbourhood(&self, row: isize, column: isize) -> Neighbourhood {
+        let mut sampled = false;
+        let measure = self.measure();
+        let (mut along, mut down) = (0.0, 0.0);
+        for i in -1..=1 {
+            let centre =
+                |i: isize, j: isize| self.centre_rows.terms(self.centre_rows.place(row + i, column + j));
+            for j in -1..=1 {
+                sampled |= self.centre_rows.is_sampled(self.centre_rows.place(row + i, column + j));
+            }
+            along += measure.step(centre(i, -1), centre(i, 0)) + measure.step(centre(i, 0), centre(i, 1));
+            down += measure.step(centre(-1, i), centre(0, i)) + measure.step(centre(0, i), centre(1, i));
+        }
+        Neighbourhood { sampled, along, down }
     }
 
     /// The mean over a pixel's square along lines in the direction in which its neighbourhood changes most; `None` where
@@ -649,10 +667,8 @@ impl<'a, 's> Painter<'a, 's> {
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + PLACE_SHIFT * y;
             let shift = (shift - floor(shift) - 0.5) / parts as f64;
-            let mut places = [0.0; PIXEL_PARTS_FINE + 1];
-            let places = evenly(&mut places, parts, shift);
             let narrowest = if tally.primary - before > PIXEL_RAYS_ENOUGH { 1.0 } else { PLACES_NARROWEST };
-            integrate(&measure, &Fineness { places, goal, narrowest }, inner, out, &mut |x, slot| {
+            integrate(&measure, &Fineness { parts, shift, goal, narrowest }, inner, out, &mut |x, slot| {
                 // a ray on the very edge may see what lies beyond it
                 let [x, y] = [x, y].map(|x| clamp(x, PIXEL_MARGIN, 1.0 - PIXEL_MARGIN));
                 let (x, y) = if along { (x, y) } else { (y, x) };
@@ -670,8 +686,7 @@ impl<'a, 's> Painter<'a, 's> {
                 (!path.sampled).then_some(0.0)
             })
         };
-        let mut places = [0.0; PIXEL_PARTS_FINE + 1];
-        let fineness = Fineness { places: evenly(&mut places, parts, 0.0), goal, narrowest: LINES_NARROWEST };
+        let fineness = Fineness { parts, shift: 0.0, goal, narrowest: LINES_NARROWEST };
         let error2 = integrate(&measure, &fineness, outer, out, &mut line)?;
         let out = self.work.part(2 * line_integral::memory(stride)..self.work.len());
         put(target, measure.bands, index..index + 1, 1.0, |term, band| out.at(term * measure.bands + band));
@@ -752,16 +767,6 @@ impl<'a, 's> Painter<'a, 's> {
         }
         spread
     }
-}
-
-/// Ends of `parts` equal parts of the unit interval, those within it shifted.
-#[inline]
-fn evenly(places: &mut [f64; PIXEL_PARTS_FINE + 1], parts: usize, shift: f64) -> &[f64] {
-    let places = places.head_mut(parts + 1);
-    places.iter_mut().enumerate().for_each(|(i, x)| *x = i as f64 / parts as f64 + shift);
-    places.set(0, 0.0);
-    places.set(parts, 1.0);
-    places
 }
 
 /// Writes the terms of pixels, `of` term and band, times `share`.

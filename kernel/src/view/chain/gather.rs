@@ -441,7 +441,7 @@ impl Solved<'_> {
         };
         let mut inner = Path::default();
         loop {
-            self.follow(&mut state, hit, mode, terms, &mut inner);
+            self.follow(&mut state, &mut hit, mode, terms, &mut inner);
             let Some(onward) = state.onward.as_mut() else { break };
             let Some(ray) = onward.ray.take() else { break };
             core::mem::swap(&mut state.throughput, &mut onward.throughput);

@@ -39,6 +39,16 @@ fn faces(surface: &Surface, sun: &Sun<'_>) -> bool {
     surface.normal.dot(sun.direction()) > -sun.half_angle()
 }
 
+/// An image of the sun that flat mirrors show.
+struct ShownSun<'a> {
+    /// The sun itself.
+    sun: &'a Sun<'a>,
+    /// The sun where it seems to stand.
+    image: Sun<'a>,
+    /// Most mirrors on the way to it.
+    mirrors_most: u32,
+}
+
 impl Solved<'_> {
     /// cos(sun) V at a point: one shadow ray for a point sun, a few for a disc.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
@@ -323,33 +333,62 @@ impl Solved<'_> {
         terms: &mut Terms,
         path: &mut Path,
     ) {
-        let bands = self.shape.bands;
-        let most = self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
+        let mirrors_most =
+            self.settings.max_bounces.map_or(u32::MAX, |most| most.saturating_sub(state.mirrors));
         let mut images = mode.occluders.images(self, surface, sun.half_angle());
         while let Some(one) = images.next(mode.occluders) {
-            let axis = one.axis;
-            let image = sun.seen_toward(axis);
-            if !faces(surface, &image) {
-                continue;
+            let shown = &ShownSun { sun, image: sun.seen_toward(one.axis), mirrors_most };
+            if faces(surface, &shown.image) && self.may_show(&one, surface, sun, mode.occluders) {
+                self.add_gloss_of_image(state, surface, (shown, lobe, mirrored), mode.sample, terms, path);
             }
-            if !self.may_show(&one, surface, sun, mode.occluders) {
-                continue;
-            }
-            let [lit, products] = &mut *state.images;
-            lit.head_mut(bands).fill(0.0);
-            let (disc, value) = Disc::of_lobe(lobe, mirrored, &image);
-            let at_stake = value * self.gloss_at_stake(state.throughput, sun);
-            let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
-                let seen = toward.dot(surface.normal) > 0.0
-                    && self.mirrored_sun(sun, surface, (toward, axis), most, products, path);
-                if seen {
-                    lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
-                }
-                seen
-            });
-            self.add_highlight(state, (sun, value, all), terms);
-            self.glare(state, lobe, value, at_stake, path);
         }
+    }
+
+    /// One image of the sun in a lobe about the direction `mirrored`.
+    // apart on small machines: does not burden the stack of finding the mirrors that show it
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn add_gloss_of_image(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        (shown, lobe, mirrored): (&ShownSun<'_>, &Lobe, Vec3),
+        sample: RaySample,
+        terms: &mut Terms,
+        path: &mut Path,
+    ) {
+        // in one place of the stack: it is large
+        let highlight = &Highlight::new(lobe, mirrored, &shown.image);
+        let (disc, value) = Disc::of_lobe(highlight.as_ref(), lobe, mirrored, &shown.image);
+        let at_stake = value * self.gloss_at_stake(state.throughput, shown.sun);
+        let all = self.shown_over_disc(state, surface, shown, (&disc, at_stake), sample, path);
+        self.add_highlight(state, (shown.sun, value, all), terms);
+        self.glare(state, lobe, value, at_stake, path);
+    }
+
+    /// Sums the lit share of an image's disc into `state.images`; returns the sum of all shares.
+    // apart on small machines: does not burden the stack of finding the highlight
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn shown_over_disc(
+        &self,
+        state: &mut PathState<'_>,
+        surface: &Surface,
+        shown: &ShownSun<'_>,
+        (disc, at_stake): (&Disc<'_>, f64),
+        sample: RaySample,
+        path: &mut Path,
+    ) -> f64 {
+        let ShownSun { sun, image, mirrors_most } = shown;
+        let (bands, axis) = (self.shape.bands, image.direction());
+        let [lit, products] = &mut *state.images;
+        lit.head_mut(bands).fill(0.0);
+        self.over_disc(disc, at_stake, sample, path, |path, toward, share| {
+            let seen = toward.dot(surface.normal) > 0.0
+                && self.mirrored_sun(sun, surface, (toward, axis), *mirrors_most, products, path);
+            if seen {
+                lit.iter_mut().zip(&*products).take(bands).for_each(|(sum, p)| *sum += share * p);
+            }
+            seen
+        })
     }
 
     /// The sun itself in a lobe about the direction `mirrored`.
@@ -368,7 +407,8 @@ impl Solved<'_> {
         let known = mode.occluders.before(self, surface, RayKind::Sun, (sun.direction(), sun.half_angle()));
         let [lit, _] = &mut *state.images;
         lit.head_mut(bands).fill(0.0);
-        let (disc, value) = Disc::of_lobe(lobe, mirrored, sun);
+        let highlight = &Highlight::new(lobe, mirrored, sun);
+        let (disc, value) = Disc::of_lobe(highlight.as_ref(), lobe, mirrored, sun);
         let at_stake = value * self.gloss_at_stake(state.throughput, sun);
         let all = self.over_disc(&disc, at_stake, mode.sample, path, |path, toward, share| {
             let seen = toward.dot(surface.normal) > 0.0 && self.sees_sun(surface, toward, known, path);
@@ -422,20 +462,23 @@ enum Disc<'a> {
     /// Evenly, each by its share of the irradiance of a plane of this normal.
     OnPlane(&'a Sun<'a>, Vec3),
     /// As dense as a lobe is high.
-    InLobe(Highlight),
+    InLobe(&'a Highlight),
     /// Evenly, in a lobe that is the same all over it.
-    Even(Sun<'a>),
+    Even(&'a Sun<'a>),
 }
 
 impl<'a> Disc<'a> {
-    /// The disc in a lobe about the direction `mirrored`, and the mean of q/rho_0 over it.
-    fn of_lobe(lobe: &Lobe, mirrored: Vec3, sun: &Sun<'a>) -> (Disc<'a>, f64) {
-        match Highlight::new(lobe, mirrored, sun) {
-            Some(highlight) => {
-                let value = highlight.value;
-                (Disc::InLobe(highlight), value)
-            }
-            None => (Disc::Even(*sun), lobe.value(mirrored.dot(sun.direction()))),
+    /// The disc in a lobe about the direction `mirrored`, and the mean of q/rho_0 over it: the lobe's highlight, or where there
+    /// is none, the lobe at the disc's middle.
+    fn of_lobe(
+        highlight: Option<&'a Highlight>,
+        lobe: &Lobe,
+        mirrored: Vec3,
+        sun: &'a Sun<'a>,
+    ) -> (Disc<'a>, f64) {
+        match highlight {
+            Some(highlight) => (Disc::InLobe(highlight), highlight.value),
+            None => (Disc::Even(sun), lobe.value(mirrored.dot(sun.direction()))),
         }
     }
 

@@ -67,13 +67,26 @@ impl Measure<'_> {
 
 /// How finely an integral is done.
 #[derive(Clone, Copy)]
-pub(super) struct Fineness<'a> {
-    /// First places, from 0 to 1.
-    pub places: &'a [f64],
+pub(super) struct Fineness {
+    /// Equal intervals to begin with.
+    pub parts: usize,
+    /// Shift of the places between them.
+    pub shift: f64,
     /// Error wanted of an interval.
     pub goal: f64,
     /// Narrower intervals are not halved.
     pub narrowest: f64,
+}
+
+impl Fineness {
+    /// One of the first places, from 0 to 1: the ends of equal parts, those within the unit interval shifted.
+    fn place(&self, number: usize) -> f64 {
+        match number {
+            0 => 0.0,
+            number if number >= self.parts => 1.0,
+            number => number as f64 / self.parts as f64 + self.shift,
+        }
+    }
 }
 
 /// The integral over [0, 1], written to `out`, and its expected squared error.
@@ -84,60 +97,94 @@ pub(super) struct Fineness<'a> {
 #[inline(never)]
 pub(super) fn integrate(
     measure: &Measure<'_>,
-    fineness: &Fineness<'_>,
+    fineness: &Fineness,
     memory: &mut [f64],
     out: &mut [f64],
     value: &mut dyn FnMut(f64, &mut [f64]) -> Option<f64>,
 ) -> Option<f64> {
     let stride = measure.stride();
-    let size = stride + PLACE_NOTES;
-    let mut put = |memory: &mut [f64], slot: usize, x: f64| {
-        put(memory.part_mut(slot * size..(slot + 1) * size), stride, x, value)
-    };
-    let node = |memory: &[f64], slot: usize| {
-        let at = slot * size + stride;
-        (memory.at(at), memory.at(at + 1), memory.at(at + 2))
-    };
     out.fill(0.0);
     let mut error2 = 0.0;
-    put(memory, 0, fineness.places.at(0))?;
-    for &place in fineness.places.part(1..fineness.places.len()) {
-        put(memory, 1, place)?;
+    put(memory, (stride, 0), fineness.place(0), value)?;
+    for number in 1..=fineness.parts {
+        put(memory, (stride, 1), fineness.place(number), value)?;
         let mut top = 1;
         while top > 0 {
-            let ((start, left2, _), (end, right2, known)) = (node(memory, 0), node(memory, top));
-            let width = end - start;
-            let (left, right) = (memory.part(0..stride), memory.part(top * size..top * size + stride));
-            let error = if known >= 0.0 { known } else { JUMP * width * measure.step(left, right) };
-            if known >= 0.0 || error <= fineness.goal || width <= fineness.narrowest || top + 1 >= SLOTS {
-                add(out, left, right, 0.5 * width);
-                error2 += error * error + 0.5 * width * width * (left2 + right2);
-                let (first, rest) = memory.split_at_mut_checked(size)?;
-                copy(first, rest.part((top - 1) * size..top * size));
-                top -= 1;
-                continue;
+            match add_interval(measure, fineness, memory, top, out) {
+                Some(square) => {
+                    error2 += square;
+                    top -= 1;
+                }
+                None => {
+                    let middle = 0.5 * (note(memory, (stride, 0), 0) + note(memory, (stride, top), 0));
+                    put(memory, (stride, top + 1), middle, value)?;
+                    check_bend(measure, fineness, memory, top);
+                    top += 1;
+                }
             }
-            put(memory, top + 1, 0.5 * (start + end))?;
-            let vector = |slot: usize| memory.part(slot * size..slot * size + stride);
-            let error = JUMP * width * measure.bend(vector(0), vector(top + 1), vector(top));
-            if error <= fineness.goal {
-                memory.set((top + 1) * size + stride + 2, error);
-                memory.set(top * size + stride + 2, 0.0);
-            }
-            top += 1;
         }
     }
     Some(error2)
 }
 
+/// A note on a slot's place: 0: the place; 1: its value's squared error; 2: the error of the interval to its left, where that
+/// is known, else negative.
+fn note(memory: &[f64], (stride, slot): (usize, usize), number: usize) -> f64 {
+    memory.at(slot * (stride + PLACE_NOTES) + stride + number)
+}
+
+/// Adds the interval from the left end to the slot `top`, which becomes the left end, and returns its expected squared error;
+/// `None` where it is to be halved.
+// apart on small machines, as is the next: does not burden the stack of the values
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+fn add_interval(
+    measure: &Measure<'_>,
+    fineness: &Fineness,
+    memory: &mut [f64],
+    top: usize,
+    out: &mut [f64],
+) -> Option<f64> {
+    let stride = measure.stride();
+    let size = stride + PLACE_NOTES;
+    let known = note(memory, (stride, top), 2);
+    let width = note(memory, (stride, top), 0) - note(memory, (stride, 0), 0);
+    let (left, right) = (memory.part(0..stride), memory.part(top * size..top * size + stride));
+    let error = if known >= 0.0 { known } else { JUMP * width * measure.step(left, right) };
+    let is_fine = known >= 0.0 || error <= fineness.goal || width <= fineness.narrowest || top + 1 >= SLOTS;
+    if !is_fine {
+        return None;
+    }
+    add(out, left, right, 0.5 * width);
+    let ends = note(memory, (stride, 0), 1) + note(memory, (stride, top), 1);
+    let (first, rest) = memory.split_at_mut_checked(size).unwrap_or_default();
+    copy(first, rest.part((top - 1) * size..top * size));
+    Some(error * error + 0.5 * width * width * ends)
+}
+
+/// Notes the error of both halves of an interval whose middle stands above `top`, where that is near enough to its ends' mean.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+fn check_bend(measure: &Measure<'_>, fineness: &Fineness, memory: &mut [f64], top: usize) {
+    let stride = measure.stride();
+    let size = stride + PLACE_NOTES;
+    let vector = |slot: usize| memory.part(slot * size..slot * size + stride);
+    let width = note(memory, (stride, top), 0) - note(memory, (stride, 0), 0);
+    let error = JUMP * width * measure.bend(vector(0), vector(top + 1), vector(top));
+    if error <= fineness.goal {
+        memory.set((top + 1) * size + stride + 2, error);
+        memory.set(top * size + stride + 2, 0.0);
+    }
+}
+
 /// Fills in the values at a place and its notes.
 #[cfg_attr(target_pointer_width = "32", inline(never))]
 fn put(
-    node: &mut [f64],
-    stride: usize,
+    memory: &mut [f64],
+    (stride, slot): (usize, usize),
     x: f64,
     value: &mut dyn FnMut(f64, &mut [f64]) -> Option<f64>,
 ) -> Option<()> {
+    let size = stride + PLACE_NOTES;
+    let node = memory.part_mut(slot * size..(slot + 1) * size);
     let square = value(x, node.head_mut(stride))?;
     copy(node.part_mut(stride..stride + PLACE_NOTES), &[x, square, -1.0]);
     Some(())
@@ -156,7 +203,7 @@ mod tests {
     /// The integral of `f`, its estimated error, and the values that it took.
     fn integral(goal: f64, f: impl Fn(f64) -> f64) -> (f64, f64, u32) {
         let measure = Measure { bands: 1, reference: &[2.0] };
-        let fineness = Fineness { places: &[0.0, 0.3, 0.55, 0.7, 1.0], goal, narrowest: 1e-4 };
+        let fineness = Fineness { parts: 4, shift: 0.05, goal, narrowest: 1e-4 };
         let (mut work, mut out, mut count) = ([0.0; memory(3)], [0.0; 3], 0);
         let square = integrate(&measure, &fineness, &mut work, &mut out, &mut |x, slot| {
             count += 1;
@@ -193,7 +240,7 @@ mod tests {
     #[test]
     fn a_value_that_is_refused_ends_it() {
         let measure = Measure { bands: 1, reference: &[1.0] };
-        let fineness = Fineness { places: &[0.0, 1.0], goal: 1e-3, narrowest: 1e-3 };
+        let fineness = Fineness { parts: 1, shift: 0.0, goal: 1e-3, narrowest: 1e-3 };
         let (mut work, mut out) = ([0.0; memory(3)], [0.0; 3]);
         assert!(integrate(&measure, &fineness, &mut work, &mut out, &mut |_, _| None).is_none());
     }

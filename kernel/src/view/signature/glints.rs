@@ -117,6 +117,16 @@ struct Seen<'s> {
     most: u32,
 }
 
+/// How the direction that a part of a facet mirrors toward the observer changes over it: lengths of differences of unit vectors.
+struct Spread {
+    /// From the middle's to the mean of the corners'.
+    bend: f64,
+    /// From the middle's to the farthest of the corners'.
+    reach: f64,
+    /// From the middle's to the direction of the sun.
+    off: f64,
+}
+
 impl Glints<'_, '_, '_> {
     /// Adds what the facets of a row show.
     pub fn row(&mut self, row: usize, sums: &mut Sums) {
@@ -178,6 +188,18 @@ impl Glints<'_, '_, '_> {
         self.mirrored(seen, at).1
     }
 
+    /// How the mirrored direction changes over a part of a facet.
+    // apart on small machines: does not burden the stack of what the part shows
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    fn spread(&self, seen: &Seen<'_>, part: &Part) -> Spread {
+        let ends = part.corners.map(|corner| self.toward(seen, corner));
+        let middle = self.toward(seen, part.at(1.0 / 3.0, 1.0 / 3.0));
+        let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
+        let off = sqrt((middle - seen.sun.direction()).length_squared());
+        let bend = (ends[0] + ends[1] + ends[2]) / 3.0 - middle;
+        Spread { bend: sqrt(bend.length_squared()), reach: sqrt(reach), off }
+    }
+
     /// A point of a facet, and the direction that it mirrors toward the observer.
     fn mirrored(&self, seen: &Seen<'_>, (u, v): (f64, f64)) -> (Surface, Vec3) {
         let surface = Surface::new(self.solved.scene, seen.facet, seen.side, u, v);
@@ -219,18 +241,12 @@ impl Glints<'_, '_, '_> {
     fn glint(&mut self, seen: &Seen<'_>, sums: &mut Sums) {
         let (axis, radius) = (seen.sun.direction(), sin(seen.sun.half_angle()));
         let halves = |this: &mut Self, part: &Part| {
-            let ends = part.corners.map(|corner| this.toward(seen, corner));
-            let middle = this.toward(seen, part.at(1.0 / 3.0, 1.0 / 3.0));
-            let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
-            let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
+            let Spread { bend, reach, off } = this.spread(seen, part);
             // half as far again: the direction bends
             if off > 1.5 * reach + 1.01 * radius {
                 return None;
             }
-            let bend = (ends[0] + ends[1] + ends[2]) / 3.0 - middle;
-            Some(
-                sqrt(bend.length_squared()) > GLINT_BEND_MOST * radius || reach > GLINT_WIDTH_FACTOR * radius,
-            )
+            Some(bend > GLINT_BEND_MOST * radius || reach > GLINT_WIDTH_FACTOR * radius)
         };
         let (first, second) = frame(axis);
         self.parts(halves, |this, part| {
@@ -282,16 +298,13 @@ impl Glints<'_, '_, '_> {
     /// The sun in a lobe.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn highlight(&mut self, seen: &Seen<'_>, lobe: &Lobe, sums: &mut Sums) {
-        let (axis, solved) = (seen.sun.direction(), self.solved);
+        let solved = self.solved;
         let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
         let scale = self.scale(seen);
         let faint = GLINT_FAINT * solved.settings.budget.image * self.whole;
         let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
         let halves = |this: &mut Self, part: &Part| {
-            let ends = part.corners.map(|corner| this.toward(seen, corner));
-            let middle = this.toward(seen, part.at(1.0 / 3.0, 1.0 / 3.0));
-            let reach = ends.iter().map(|end| (*end - middle).length_squared()).fold(0.0, f64::max);
-            let (reach, off) = (sqrt(reach), sqrt((middle - axis).length_squared()));
+            let Spread { reach, off, .. } = this.spread(seen, part);
             let nearest = (off - 1.5 * reach).max(0.0);
             // the lobe as high as at the nearest point
             let most = lobe.value(1.0 - 0.5 * nearest * nearest);
