@@ -12,6 +12,7 @@ pub mod element;
 mod exact;
 pub mod kept;
 pub mod mirror_path;
+pub mod motion;
 pub mod pack;
 pub mod plane_sides;
 pub mod row_builder;

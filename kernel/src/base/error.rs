@@ -159,6 +159,16 @@ pub enum Error {
         facet: usize,
         field: Field,
     },
+    /// A facet belongs to a part that has no pose.
+    PartOutOfRange {
+        facet: usize,
+        part: usize,
+        parts: usize,
+    },
+    /// A part's pose is not finite, or its matrix no rotation.
+    Pose {
+        part: usize,
+    },
     /// A light's array has not one value per band, or per facet, side and band.
     LightBandCount {
         field: Field,
@@ -246,6 +256,10 @@ impl fmt::Display for Error {
             Error::Uncoupled { facet, field } => {
                 write!(f, "facet {facet}: {}: the coupling was made without entries for it", field.name())
             }
+            Error::PartOutOfRange { facet, part, parts } => {
+                write!(f, "facet {facet}: part {part} is out of range (parts: {parts})")
+            }
+            Error::Pose { part } => write!(f, "part {part}: its pose is not finite or no rotation"),
             Error::LightBandCount { field, expected, given } => {
                 write!(f, "{}: expected {expected} values, got {given}", field.name())
             }

@@ -10,6 +10,7 @@ use crate::base::arena;
 use crate::base::index::{Index, IndexMut, copy};
 use crate::base::math::Vec3;
 use crate::base::octahedron::{self, SKY_BITS};
+use crate::scene::pose::Pose;
 use core::cmp::Ordering;
 
 /// Words of a bundle's head: count, path, weight (2), gradient (2), half differences (4).
@@ -71,8 +72,13 @@ impl<'m> Bundles<'m> {
         self.0.len() / RECORD_WORDS
     }
 
-    /// Copies them to as many records, the paths by `path`; `None` where that says so.
-    pub(super) fn copy(self, to: &mut [Record], mut path: impl FnMut(u16) -> Option<u16>) -> Option<()> {
+    /// Copies them to as many records, the paths by `path`, the directions turned as a part is; `None` where the path is.
+    pub(super) fn copy(
+        self,
+        to: &mut [Record],
+        mut path: impl FnMut(u16) -> Option<u16>,
+        pose: Option<&Pose>,
+    ) -> Option<()> {
         let (all, to) = (self.0.len(), arena::words_mut(to));
         copy(to, self.0);
         let mut rest = self;
@@ -80,6 +86,9 @@ impl<'m> Bundles<'m> {
             let at = all - rest.0.len();
             let Some(bundle) = rest.next() else { return Some(()) };
             to.set(at + PATH_WORD, u32::from(path(bundle.path)?));
+            let Some(pose) = pose else { continue };
+            let turned = bundle.directions().map(|d| octahedron::pack::<SKY_BITS>(pose.turn(d)) as u32);
+            to.part_mut(at + HEAD..all).iter_mut().zip(turned).for_each(|(to, packed)| *to = packed);
         }
     }
 

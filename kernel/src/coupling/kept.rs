@@ -12,6 +12,8 @@ use crate::base::error::{Error, Field};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::fabs;
 use crate::coupling::element::Elements;
+use crate::coupling::motion::Motion;
+use crate::scene::pose::Pose;
 use crate::scene::{NO_MIRROR, Scene};
 use core::ops::Range;
 
@@ -59,6 +61,10 @@ pub struct Change<'a> {
     rescaled: bool,
     /// Some mirror class has another name.
     renamed: bool,
+    /// Rows keep the directions of escapes.
+    directional: bool,
+    /// What moved.
+    motion: Option<&'a Motion<'a>>,
 }
 
 impl<'a> Change<'a> {
@@ -98,6 +104,8 @@ impl<'a> Change<'a> {
             grown: false,
             rescaled: false,
             renamed: false,
+            directional: true,
+            motion: None,
         };
         mirrors.fill(NO_MIRROR);
         for (facet, mark) in facets.iter_mut().enumerate().filter(|(facet, _)| new.areas().at(*facet) > 0.0) {
@@ -105,6 +113,11 @@ impl<'a> Change<'a> {
         }
         (change.mirrors, change.facets) = (mirrors, facets);
         Ok(change)
+    }
+
+    /// The same where parts have moved, of rows with or without directions.
+    pub fn moved(self, motion: Option<&'a Motion<'a>>, directional: bool) -> Change<'a> {
+        Change { motion, directional, ..self }
     }
 
     /// The marks of a facet; notes what became of its mirror class.
@@ -139,7 +152,8 @@ impl<'a> Change<'a> {
 
     /// Whether nothing but diffuse reflectances and emissions may be other ones, and no row is wanted that was not.
     pub fn is_diffuse_alone(&self, coupling: &Coupling<'_>) -> bool {
-        let none = !(self.unseen || self.mirror || self.grown || self.rescaled || self.renamed);
+        let none = self.motion.is_none()
+            && !(self.unseen || self.mirror || self.grown || self.rescaled || self.renamed);
         none && coupling.rows(0..coupling.unknowns()).all(|(unknown, row)| self.is_enough(unknown, &row))
     }
 
@@ -154,7 +168,14 @@ impl<'a> Change<'a> {
         if !self.is_enough(unknown, row) {
             return ROW_REDONE;
         }
-        if matches!(row.row.state, ABSENT | OPEN) {
+        if row.row.state == ABSENT {
+            return ROW_KEPT;
+        }
+        let keeps = |motion: &Motion<'_>| motion.keeps(self.elements, unknown, row, self.directional);
+        if !self.motion.is_none_or(keeps) {
+            return ROW_REDONE;
+        }
+        if row.row.state == OPEN {
             return ROW_KEPT;
         }
         let mark = |mark: u8| {
@@ -237,6 +258,12 @@ impl<'a> Kept<'a> {
     pub(super) fn row(&self, unknown: usize) -> Option<RowView<'a>> {
         let redone = self.fates.get(unknown).is_none_or(|fate| *fate == ROW_REDONE);
         if redone { None } else { self.coupling.rows(unknown..unknown + 1).next().map(|(_, row)| row) }
+    }
+
+    /// How the directions of an unknown's row are turned, where they are.
+    pub(super) fn pose(&self, unknown: usize) -> Option<&Pose> {
+        let facet = self.change.elements.facet_of(unknown).0;
+        self.change.motion.map(|motion| motion.pose(facet)).filter(|pose| !pose.is_unturned())
     }
 
     /// The class that stands for one of the old scene's.

@@ -9,6 +9,7 @@ use crate::base::index::{Index, IndexMut};
 use crate::base::sort;
 use crate::coupling::plane_sides::SIDE_SET_WORDS;
 use crate::scene::Scene;
+use crate::scene::pose::Pose;
 use core::cmp::Ordering;
 use core::ops::Range;
 
@@ -175,8 +176,14 @@ impl<'m> RowBuilder<'m> {
         self.used = self.start;
     }
 
-    /// Adds a row of another coupling as it is, its paths by their classes now; `None` where the memory is full.
-    pub(super) fn copy_row(&mut self, row: &RowView<'_>, kept: &Kept<'_>, scene: &Scene<'_>) -> Option<()> {
+    /// Adds a row of another coupling as it is, its paths by their classes now, the directions of its escapes turned as
+    /// its part is; `None` where the memory is full.
+    pub(super) fn copy_row(
+        &mut self,
+        row: &RowView<'_>,
+        (kept, pose): (&Kept<'_>, Option<&Pose>),
+        scene: &Scene<'_>,
+    ) -> Option<()> {
         let mut known = [(STRAIGHT, STRAIGHT); PATHS_KNOWN];
         let paths = &mut self.paths;
         let mut path = |old: u16| carry(paths, (row, kept, scene), old, &mut known);
@@ -187,7 +194,8 @@ impl<'m> RowBuilder<'m> {
         }
         let escapes = self.used;
         let end = escapes + row.escapes.room();
-        row.escapes.copy(self.records.get_mut(escapes..end)?, path)?;
+        let pose = pose.filter(|_| self.head.directional != 0);
+        row.escapes.copy(self.records.get_mut(escapes..end)?, path, pose)?;
         self.used = end;
         self.rows.set(self.done, Row { start: self.start as u32, escapes: escapes as u32, ..row.row });
         self.done += 1;

@@ -213,7 +213,7 @@ pub fn fill(of: &CouplingRows<'_>, range: Range<usize>, memory: &mut [u8]) -> Re
     for unknown in range {
         let row = kept.as_ref().and_then(|kept| Some((kept.row(unknown)?, kept)));
         let done = match row {
-            Some((row, kept)) => tracer.builder.copy_row(&row, kept, scene),
+            Some((row, kept)) => tracer.builder.copy_row(&row, (kept, kept.pose(unknown)), scene),
             None => tracer.row(unknown),
         };
         if done.is_none() {
@@ -239,8 +239,8 @@ struct Tracer<'a, 'm> {
     proven: &'m mut [u64],
 }
 
-/// Where the rays of a row start.
-struct Start {
+/// The rays of a row: where they start, and where to.
+pub(super) struct RowRays {
     element: usize,
     facet: usize,
     side: usize,
@@ -248,6 +248,38 @@ struct Start {
     cluster: bool,
     frame: (Vec3, Vec3),
     sequences: [Sequence; ELEMENT_PARTS],
+}
+
+impl RowRays {
+    /// Those of an unknown.
+    pub(super) fn new(scene: &Scene<'_>, elements: &Elements<'_>, unknown: usize) -> RowRays {
+        let (facet, side) = elements.facet_of(unknown);
+        RowRays {
+            element: unknown / scene.sides().max(1),
+            facet,
+            side,
+            cluster: elements.is_cluster(unknown),
+            frame: frame(scene.side_normal(facet, side)),
+            sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
+        }
+    }
+
+    /// Ray `number`, and the part of a part from which it starts.
+    #[inline]
+    pub(super) fn ray(&self, scene: &Scene<'_>, elements: &Elements<'_>, number: u32) -> (Ray, usize) {
+        let (part, index) = (number as usize % ELEMENT_PARTS, number / ELEMENT_PARTS as u32);
+        let sequence = &self.sequences[part];
+        let (p, q) = sequence.pair(index, 2);
+        let (a, b) = triangle(p, q);
+        let bin = part * ELEMENT_PARTS + quarter::into(a, b).0;
+        let (a, b) = quarter::out_of(part, (a, b));
+        let (p, q) = sequence.pair(index, 0);
+        let (dx, dy, dz) = cosine_direction(p, q);
+        let (facet, u, v) = elements.place(self.element, a, b);
+        let origin = Surface::new(scene, facet, self.side, u, v);
+        let axes = if self.cluster { frame(origin.normal) } else { self.frame };
+        (origin.spawn_ray(axes.0 * dx + axes.1 * dy + origin.normal * dz), bin)
+    }
 }
 
 /// What the rays of a row have found so far.
@@ -342,14 +374,7 @@ impl Tracer<'_, '_> {
             );
             return Some(());
         }
-        let start = Start {
-            element: unknown / self.scene.sides().max(1),
-            facet,
-            side,
-            cluster,
-            frame: frame(normal),
-            sequences: [0, 1, 2, 3].map(|part| Sequence::new(hash2(unknown as u32, 0x0b11_7000 + part))),
-        };
+        let start = RowRays::new(self.scene, self.elements, unknown);
         let most = self.most_rays(self.elements.area(self.scene, unknown));
         let mut tally = Tally::default();
         let proven = core::mem::take(&mut self.proven);
@@ -364,7 +389,7 @@ impl Tracer<'_, '_> {
 
     /// The row by rays alone.
     #[inline(never)]
-    fn sampled(&mut self, start: &Start, most: u32, tally: &mut Tally) -> Option<()> {
+    fn sampled(&mut self, start: &RowRays, most: u32, tally: &mut Tally) -> Option<()> {
         self.rays(start, (ROW_RAYS_FEWEST.max(most / 16), most), [false; ROW_BINS], None, tally)?;
         let mixed = tally.mixed();
         if self.scene.sides() == 1 && mixed.contains(&true) {
@@ -380,7 +405,7 @@ impl Tracer<'_, '_> {
     #[inline(never)]
     fn closed(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         normal: Vec3,
         most: u32,
         proven: &mut [u64],
@@ -444,7 +469,7 @@ impl Tracer<'_, '_> {
 
     /// Whether `entries` entries in closed form cost less than the rays that they spare, as far as the first few rays
     /// tell.
-    fn is_worth(&mut self, start: &Start, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
+    fn is_worth(&mut self, start: &RowRays, entries: usize, most: u32, tally: &mut Tally) -> Option<bool> {
         if entries <= ROW_RAYS_FEWEST as usize {
             return Some(true);
         }
@@ -461,7 +486,7 @@ impl Tracer<'_, '_> {
     /// by `apart` leave no record, nor do the first hits on what is `clear`.
     fn rays(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         (fewest, most): (u32, u32),
         apart: [bool; ROW_BINS],
         clear: Option<&ProvenVisible<'_>>,
@@ -572,7 +597,7 @@ impl Tracer<'_, '_> {
     /// The next `count` rays of a row, which meet their first facets together, and their mirror chains.
     fn batch(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         tally: &mut Tally,
         count: u32,
         clear: Option<&ProvenVisible<'_>>,
@@ -582,7 +607,7 @@ impl Tracer<'_, '_> {
         let mut hits = [None; ROW_RAYS_TOGETHER];
         let (rays, hits) = (rays.head_mut(count as usize), hits.head_mut(count as usize));
         for ((number, ray), bin) in (tally.rays..).zip(&mut *rays).zip(&mut bins) {
-            (*ray, *bin) = self.ray(start, number);
+            (*ray, *bin) = start.ray(self.scene, self.elements, number);
         }
         self.bvh.closest_many(rays, hits);
         for ((ray, &hit), &bin) in rays.iter().zip(&*hits).zip(&bins) {
@@ -592,29 +617,12 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    /// Ray `number` of a row, and the part of a part from which it starts.
-    #[inline]
-    fn ray(&self, start: &Start, number: u32) -> (Ray, usize) {
-        let (part, index) = (number as usize % ELEMENT_PARTS, number / ELEMENT_PARTS as u32);
-        let sequence = &start.sequences[part];
-        let (p, q) = sequence.pair(index, 2);
-        let (a, b) = triangle(p, q);
-        let bin = part * ELEMENT_PARTS + quarter::into(a, b).0;
-        let (a, b) = quarter::out_of(part, (a, b));
-        let (p, q) = sequence.pair(index, 0);
-        let (dx, dy, dz) = cosine_direction(p, q);
-        let (facet, u, v) = self.elements.place(start.element, a, b);
-        let origin = Surface::new(self.scene, facet, start.side, u, v);
-        let axes = if start.cluster { frame(origin.normal) } else { start.frame };
-        (origin.spawn_ray(axes.0 * dx + axes.1 * dy + origin.normal * dz), bin)
-    }
-
     /// Adds what ray number `tally.rays` of a row finds: its first hit, which is given, and its mirror chain. `None` where
     /// the memory is full.
     #[inline]
     fn follow(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         tally: &mut Tally,
         (ray, met): (Ray, Option<Hit>),
         bin: usize,
@@ -639,7 +647,7 @@ impl Tracer<'_, '_> {
     #[inline]
     fn first_hit(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         tally: &mut Tally,
         (ray, hit): (&Ray, &Hit),
         mut mark: [f32; 2],
@@ -682,7 +690,7 @@ impl Tracer<'_, '_> {
     #[inline]
     fn follow_mirrors(
         &mut self,
-        start: &Start,
+        start: &RowRays,
         tally: &mut Tally,
         mut ray: Ray,
         arrival: Arrival,

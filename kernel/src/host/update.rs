@@ -1,14 +1,18 @@
-//! A coupling that is kept while materials change.
+//! A coupling that is kept while materials change and parts move.
 
 use super::{Bytes, Clock, Geometry, GeometryMemory, Host, Report, Run, Seconds, blocks};
-use crate::base::arena::Memory;
+use crate::base::arena::{Arena, Memory};
 use crate::base::error::Error;
 use crate::coupling::Coupling;
 use crate::coupling::kept::{Change, Fates, Kept, ROW_REDONE};
+use crate::coupling::motion::Motion;
 use crate::coupling::plane_sides::PlaneSides;
+use crate::rays::bvh::Bvh;
+use crate::scene::pose::Parts;
 use crate::scene::{Scene, SceneInput};
 use crate::settings;
 use crate::stages::{self, CouplingRows, UpdateMemory};
+use std::vec::Vec;
 
 impl Host {
     /// The geometry of the same mesh with other materials, by what still holds of a coupling: reflectances, emissions and
@@ -27,25 +31,70 @@ impl Host {
         input: &SceneInput<'_>,
     ) -> Result<Geometry<'n>, Error> {
         let mut clock = Clock::start();
-        let (elements, settings) = (kept.elements, kept.settings);
-        let GeometryMemory { scene: scene_memory, slabs, .. } = memory;
-        *scene_memory = Memory::new(Scene::bytes(input)?);
-        let scene = Scene::new(input, scene_memory.bytes_mut())?;
+        memory.scene = Memory::new(Scene::bytes(input)?);
+        let scene = Scene::new(input, memory.scene.bytes_mut())?;
         if !scene.has_mesh_of(&kept.scene) {
             return Err(Error::Mismatch { what: "mesh" });
         }
-        let mut report = Report {
-            bytes: Bytes { scene: scene.memory(), ..kept.report.bytes },
-            seconds: Seconds { scene: clock.lap(), ..Seconds::default() },
-            ..kept.report.clone()
-        };
+        let seconds = Seconds { scene: clock.lap(), ..Seconds::default() };
+        self.renewed(kept, (scene, kept.bvh), &mut memory.slabs, None, (seconds, clock))
+    }
+
+    /// The geometry of a mesh whose parts are moved, by what still holds of the coupling of `kept`, in which all stand where
+    /// the mesh `input` has them: rows are kept whose rays can meet nothing that moved against them, before or after
+    /// ([`crate::coupling::motion`]); the rest is computed anew. Materials may be other ones, too, as for [`Host::update`].
+    ///
+    /// The result depends on `kept` and on the poses, not on poses before. It differs from a coupling from scratch in that
+    /// elements are those of `kept`, and that rays of rows that are kept turn with their parts: by what the estimates of both
+    /// tell.
+    ///
+    /// # Errors
+    /// Those of [`Host::update`] and of [`Parts::check`].
+    pub fn pose<'n>(
+        &self,
+        kept: &'n Geometry<'n>,
+        memory: &'n mut GeometryMemory,
+        input: &SceneInput<'_>,
+        parts: &Parts<'_>,
+    ) -> Result<Geometry<'n>, Error> {
+        let mut clock = Clock::start();
+        let GeometryMemory { scene: scene_memory, bvh: bvh_memory, slabs, .. } = memory;
+        *scene_memory = Memory::new(Scene::bytes(input)?);
+        let scene = Scene::posed(input, parts, scene_memory.bytes_mut())?;
+        if !scene.has_areas_of(&kept.scene) {
+            return Err(Error::Mismatch { what: "mesh" });
+        }
+        let mut seconds = Seconds { scene: clock.lap(), ..Seconds::default() };
+        *bvh_memory = Memory::new(Bvh::bytes(scene.facets())?);
+        let bvh = Bvh::build(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
+        seconds.bvh = clock.lap();
+        self.renewed(kept, (scene, bvh), slabs, Some(parts), (seconds, clock))
+    }
+
+    /// The coupling of a scene that differs from that of `kept` in materials and in the poses of parts.
+    fn renewed<'n>(
+        &self,
+        kept: &'n Geometry<'n>,
+        (scene, bvh): (Scene<'n>, Bvh<'n>),
+        slabs: &'n mut Vec<Memory>,
+        parts: Option<&Parts<'_>>,
+        (seconds, mut clock): (Seconds, Clock),
+    ) -> Result<Geometry<'n>, Error> {
+        let (elements, settings, memory_budget) = (kept.elements, kept.settings, kept.memory_budget);
+        let bytes = Bytes { scene: scene.memory(), bvh: bvh.memory(), ..kept.report.bytes };
+        let mut report = Report { bytes, seconds, ..kept.report.clone() };
         (report.rays.visibility, report.pairs, report.certified) = Default::default();
         report.skipped.clear();
         let (matrix, mut run) = (kept.coupling()?, Run::new(self));
         let mut scratch = Memory::new(UpdateMemory::need(&kept.scene, &elements).bytes()?);
         let UpdateMemory { mut change, fates } =
             UpdateMemory::take(&kept.scene, &elements, scratch.bytes_mut())?;
-        let change = Change::new(&kept.scene, &scene, &elements, settings.rows(&scene).all, &mut change)?;
+        let mut moved = Memory::new(Motion::need(parts.map_or(0, |parts| parts.poses.len())).bytes()?);
+        let mut moved = Arena::new(moved.bytes_mut(), 0)?;
+        let motion = parts.map(|parts| Motion::new(&kept.scene, *parts, &mut moved)).transpose()?;
+        let all = settings.rows(&scene).all;
+        let change = Change::new(&kept.scene, &scene, &elements, all, &mut change)?;
+        let change = change.moved(motion.as_ref(), settings.directional);
         let blocks = if change.is_diffuse_alone(&matrix) {
             report.rows = Fates { kept: elements.unknowns() as u64, ..Fates::default() };
             kept.blocks.clone()
@@ -54,22 +103,21 @@ impl Host {
             let rows = settings.rows_within(&scene, elements.unknowns());
             let wanted = report.rows.redone > 0 && settings::planes(&scene, &rows);
             let mut planes = Memory::new(PlaneSides::bytes(&scene, wanted)?);
-            let plane_sides = &PlaneSides::new(&scene, &kept.bvh, wanted, planes.bytes_mut())?;
-            let kept_rows = Some(Kept { coupling: &matrix, change: &change, fates });
-            let (bvh, elements) = (&kept.bvh, &elements);
-            let rows = CouplingRows { scene: &scene, bvh, elements, plane_sides, rows, kept: kept_rows };
-            blocks(&rows, kept.memory_budget, slabs, &mut run)?
+            let plane_sides = &PlaneSides::new(&scene, &bvh, wanted, planes.bytes_mut())?;
+            let kept = Some(Kept { coupling: &matrix, change: &change, fates });
+            let rows =
+                CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides, rows, kept };
+            blocks(&rows, memory_budget, slabs, &mut run)?
         };
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
         let redone = |(unknown, _): &(usize, _)| fates.get(*unknown).is_some_and(|fate| *fate == ROW_REDONE);
-        let all = coupling.rows(0..elements.unknowns());
-        report.rays.visibility = all.filter(redone).map(|(_, row)| row.row.all_rays()).sum();
+        let rows = coupling.rows(0..elements.unknowns()).filter(redone);
+        report.rays.visibility = rows.map(|(_, row)| row.row.all_rays()).sum();
         report.count_rows(&coupling);
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();
         report.seconds.coupling = clock.lap();
-        let (bvh, reference, rays) = (kept.bvh, kept.reference.clone(), coupling.rays());
-        let memory_budget = kept.memory_budget;
+        let (reference, rays) = (kept.reference.clone(), coupling.rays());
         Ok(Geometry { scene, bvh, elements, blocks, settings, reference, memory_budget, rays, report })
     }
 }
