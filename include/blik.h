@@ -12,8 +12,8 @@
  *       -> blik_image, blik_signatures, blik_radiance, blik_facets     once per view
  *
  * ffi/examples/minimal.c does so in 50 lines. blik_lights.h has many lights in one call and what signatures depend on,
- * blik_form_factor.h form factors of polygons without a scene, blik_plane.h the same photometry in two dimensions,
- * blik.hpp owners and exceptions for C++17.
+ * blik_update.h couplings that are kept while parts move and materials change, blik_form_factor.h form factors of polygons
+ * without a scene, blik_plane.h the same photometry in two dimensions, blik.hpp owners and exceptions for C++17.
  *
  * What is computed.  The diffuse radiance of a facet is its emission plus its diffuse reflectance over pi times what
  *   arrives: from sky and sun, straight and by way of mirrors, and from all other facets, straight and by way of mirrors.
@@ -39,7 +39,7 @@
  *   written is followed by the number of entries that there is room for, which must be exactly what the call writes.
  * Structs.  Set those that start with struct_size by their init function (inline, below), outputs too, before the
  *   members that differ: a library that is newer than the header reads and writes no more than the header knows.
- * Stability.  The functions and structs of blik.h, blik_lights.h and blik_form_factor.h are stable: within a minor
+ * Stability.  The functions and structs of blik.h, blik_lights.h, blik_update.h and blik_form_factor.h are stable: within a minor
  *   version nothing is taken away, and structs that are not called frozen may get members at their end. blik_plane.h may
  *   change with every minor version. While the major version is 0 a new minor version may change all of it; CHANGELOG.md
  *   says how callers adapt.
@@ -131,6 +131,8 @@ typedef enum blik_status {
     BLIK_ERROR_BODY = 29, /* Body index of a plane scene is no circle or polyline; field tells why. */
     /* Facet index emits or reflects (field) light for which the coupling has no entries: it was made for another material. */
     BLIK_ERROR_UNCOUPLED = 30,
+    BLIK_ERROR_PART = 31, /* Facet index belongs to a part (value) that has no pose. */
+    BLIK_ERROR_POSE = 32, /* The pose of part index is not finite, or its matrix is no rotation. */
     BLIK_STATUS_MAX_ENUM = 0x7fffffff
 } blik_status;
 
@@ -192,6 +194,7 @@ typedef enum blik_field {
     BLIK_FIELD_SAMPLES = 52, /* Samples of the plane model. */
     BLIK_FIELD_FACTORS = 53, /* Form factors. */
     BLIK_FIELD_SHARES = 54, /* Shares of facets in signatures. */
+    BLIK_FIELD_PARTS = 55, /* See blik_error. */
     BLIK_FIELD_MAX_ENUM = 0x7fffffff
 } blik_field;
 

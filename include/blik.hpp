@@ -26,6 +26,7 @@
 #include <blik.h>
 #include <blik_form_factor.h>
 #include <blik_lights.h>
+#include <blik_update.h>
 #include <blik_plane.h>
 
 #include <array>
@@ -674,8 +675,52 @@ private:
 };
 
 /* A checked mesh, ready for rays. */
+/* The rigid parts of a mesh, one part a facet, and where they stand. */
+struct parts {
+    std::vector<uint32_t> facets;
+    std::vector<blik_pose> poses;
+
+    blik_parts get() const {
+        blik_parts value;
+        blik_parts_init(&value);
+        value.facet_parts = facets.data();
+        value.facet_count = facets.size();
+        value.poses = poses.data();
+        value.pose_count = poses.size();
+        return value;
+    }
+};
+
+/* Where the mesh has a part. */
+inline blik_pose rest() { return {{1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}}; }
+
+/* By a quaternion w, x, y, z of any length but zero, and a translation. */
+inline blik_pose pose(const std::array<double, 4> &quaternion, const vector3 &translation = {0, 0, 0}) {
+    const double moved[3] = {translation[0], translation[1], translation[2]};
+    blik_error info{};
+    blik_pose value;
+    check(blik_pose_from_quaternion(quaternion.data(), moved, &info, &value), info);
+    return value;
+}
+
 class scene {
 public:
+    /* A mesh whose parts stand elsewhere. */
+    scene(const mesh &mesh, const parts &parts) {
+        const blik_parts moved = parts.get();
+        mesh.with([&](const blik_mesh &arrays) {
+#ifdef BLIK_STD
+            blik_error info{};
+            check(blik_scene_pose_create(&arrays, &moved, &info, owner_.place()), info);
+#else
+            owner_ = detail::in_memory<blik_scene>(
+                [&](blik_error *e, std::size_t *bytes) { return blik_scene_size(&arrays, e, bytes); },
+                [&](void *memory, std::size_t bytes, blik_error *e, blik_scene **out) {
+                    return blik_scene_pose_init(&arrays, &moved, memory, bytes, e, out);
+                });
+#endif
+        });
+    }
     explicit scene(const mesh &mesh) {
         mesh.with([&](const blik_mesh &arrays) {
 #ifdef BLIK_STD
@@ -743,8 +788,28 @@ public:
             &on);
 #endif
     }
+    /* By what still holds of another coupling, which must outlive it: of a scene of the same mesh with other materials. */
+    coupling(const coupling &kept, const scene &scene, const blik_run &run = alone()) : scene_(scene.get()) {
+        renew(kept, nullptr, run);
+    }
+    /* As well where parts stand elsewhere in the scene. */
+    coupling(const coupling &kept, const scene &scene, const parts &parts, const blik_run &run = alone())
+        : scene_(scene.get()) {
+        const blik_parts moved = parts.get();
+        renew(kept, &moved, run);
+    }
     /* A temporary scene would be gone before its coupling is used. */
     explicit coupling(const scene &&, const blik_settings & = blik::settings(), const blik_run & = alone()) = delete;
+    coupling(const coupling &, const scene &&, const blik_run & = alone()) = delete;
+    coupling(const coupling &, const scene &&, const parts &, const blik_run & = alone()) = delete;
+    /* What became of its rows. */
+    blik_update_info update() const {
+        blik_error info{};
+        blik_update_info value;
+        blik_update_info_init(&value);
+        check(blik_update_get_info(get(), &info, &value), info);
+        return value;
+    }
     const blik_coupling *get() const noexcept { return owner_.get(); }
     blik_coupling_info info() const {
         blik_error info{};
@@ -758,6 +823,20 @@ private:
     friend class loaded;
     friend class solution;
     coupling() = default;
+    void renew(const coupling &kept, const blik_parts *moved, const blik_run &run) {
+        detail::guard on(run);
+#ifdef BLIK_STD
+        blik_error info{};
+        on.check(blik_update_create(kept.get(), scene_, moved, on.get(), &info, owner_.place()), info);
+#else
+        owner_ = detail::in_memory<blik_coupling>(
+            [&](blik_error *e, std::size_t *bytes) { return blik_update_size(kept.get(), scene_, moved, e, bytes); },
+            [&](void *memory, std::size_t bytes, blik_error *e, blik_coupling **out) {
+                return blik_update_init(kept.get(), scene_, moved, on.get(), memory, bytes, e, out);
+            },
+            &on);
+#endif
+    }
     coupling(blik_coupling *handle, const blik_scene *scene) : scene_(scene), owner_(handle) {}
     const blik_scene *scene_ = nullptr;
     detail::owner<blik_coupling> owner_;

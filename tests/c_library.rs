@@ -301,7 +301,7 @@ fn the_examples_do_what_they_say() {
 /// All headers, one after the other.
 fn header() -> String {
     let read = |name| std::fs::read_to_string(root().join("include").join(name)).unwrap();
-    ["blik.h", "blik_form_factor.h", "blik_lights.h", "blik_plane.h"].map(read).concat()
+    ["blik.h", "blik_form_factor.h", "blik_lights.h", "blik_plane.h", "blik_update.h"].map(read).concat()
 }
 
 /// The header without comments, its white space single blanks.
@@ -370,7 +370,8 @@ fn structs() -> Vec<(String, Vec<String>)> {
 /// Sizes and offsets as the C compiler has them, constants and prototypes as the header has them.
 fn interface() -> String {
     let mut source = String::from(
-        "#include <blik_form_factor.h>\n#include <blik_lights.h>\n#include <blik_plane.h>\n#include <stdio.h>\n\
+        "#include <blik_form_factor.h>\n#include <blik_lights.h>\n#include <blik_plane.h>\n#include <blik_update.h>\n\
+        #include <stdio.h>\n\
         int main(void) {\n",
     );
     for (name, members) in structs() {

@@ -177,8 +177,39 @@ impl Drop for Handles {
 /// Refused for a reason of the caller's, or done.
 #[track_caller]
 fn refused(status: i32) -> bool {
-    assert!((BLIK_OK..BLIK_ERROR_INTERNAL).contains(&status), "status {status}");
+    let of_updates = [BLIK_ERROR_UNCOUPLED, BLIK_ERROR_PART, BLIK_ERROR_POSE].contains(&status);
+    assert!(of_updates || (BLIK_OK..BLIK_ERROR_INTERNAL).contains(&status), "status {status}");
     status != BLIK_OK
+}
+
+/// Where a mesh has a part.
+const REST: blik_pose =
+    blik_pose { rotation: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], translation: [0.0; 3] };
+
+/// Calls `with` with parts of the inputs' facets, every other one of them, of which the second stands as told.
+fn with_parts<R>(inputs: &Inputs, pose: blik_pose, with: impl FnOnce(&blik_parts) -> R) -> R {
+    let facets: Vec<u32> = (0..inputs.facets.len() as u32).map(|facet| facet % 2).collect();
+    let poses = [REST, pose];
+    with(&blik_parts {
+        facet_parts: facets.as_ptr(),
+        facet_count: facets.len(),
+        poses: poses.as_ptr(),
+        pose_count: 2,
+        ..blik_parts::default()
+    })
+}
+
+/// A scene of the inputs whose second part is moved, and its coupling by what holds of another's, as far as they go.
+fn renewed(kept: *const blik_coupling, inputs: &Inputs, pose: blik_pose) -> Option<Handles> {
+    let mut made = Handles { scene: null_mut(), coupling: null_mut(), solution: null_mut() };
+    // SAFETY: arrays as long as stated; what their numbers are is what is tested.
+    let status = with_parts(inputs, pose, |parts| unsafe {
+        match with_mesh(inputs, |mesh| blik_scene_pose_create(mesh, parts, null_mut(), &mut made.scene)) {
+            BLIK_OK => blik_update_create(kept, made.scene, parts, null(), null_mut(), &mut made.coupling),
+            status => status,
+        }
+    });
+    (!refused(status)).then_some(made)
 }
 
 /// The light of `inputs`, handed to `with`.
@@ -526,7 +557,7 @@ fn forged_blocks_do_no_harm() {
 
 #[test]
 fn odd_numbers_are_refused_or_shown_finite() {
-    let (end, mut random, mut shown, mut tries) = (until(), Random(2), 0, 0);
+    let (end, mut random, mut shown, mut tries, mut posed) = (until(), Random(2), 0, 0, 0);
     while tries < 400 || Instant::now() < end {
         tries += 1;
         let mut inputs = Inputs::new();
@@ -534,11 +565,30 @@ fn odd_numbers_are_refused_or_shown_finite() {
         let Some(made) = prepare(&inputs) else { continue };
         shown += u32::from(image(made.solution, &inputs).is_some());
         assert!(lights(made.coupling, &inputs, null()).is_ok(), "as the solution");
+        // other materials, and a part turned and moved by odd numbers
+        let mut other = Inputs { vertices: inputs.vertices.clone(), ..inputs.clone() };
+        other.values[random.below(6)][random.below(2)] = random.number();
+        let mut pose = REST;
+        let quaternion = [1.0, random.number(), random.number(), random.number()];
+        let translation = [0.1, random.number(), 0.0];
+        // SAFETY: arrays as long as stated.
+        unsafe {
+            blik_pose_from_quaternion(quaternion.as_ptr(), translation.as_ptr(), null_mut(), &mut pose);
+        }
+        if random.below(4) == 0 {
+            pose.rotation[random.below(9)] = random.number();
+        }
+        if let Some(again) = renewed(made.coupling, &other, pose) {
+            posed += 1;
+            // light too bright for what reflects now may be refused
+            let _ = lights(again.coupling, &other, null());
+        }
         // reflections are counted for small numbers of them
         let counted = (0..=32).contains(&inputs.max_bounces);
         assert_eq!(explain(made.coupling, &inputs, null()).is_err(), counted, "{inputs:?}");
     }
-    println!("{shown} of {tries} inputs shown");
+    println!("{shown} of {tries} inputs shown, {posed} with a part moved");
+    assert!(posed > 5, "{posed} of {tries}");
     assert!(shown > 20, "{shown} of {tries}");
 }
 

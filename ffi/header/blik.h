@@ -12,8 +12,8 @@
  *       -> blik_image, blik_signatures, blik_radiance, blik_facets     once per view
  *
  * ffi/examples/minimal.c does so in 50 lines. blik_lights.h has many lights in one call and what signatures depend on,
- * blik_form_factor.h form factors of polygons without a scene, blik_plane.h the same photometry in two dimensions,
- * blik.hpp owners and exceptions for C++17.
+ * blik_update.h couplings that are kept while parts move and materials change, blik_form_factor.h form factors of polygons
+ * without a scene, blik_plane.h the same photometry in two dimensions, blik.hpp owners and exceptions for C++17.
  *
  * What is computed.  The diffuse radiance of a facet is its emission plus its diffuse reflectance over pi times what
  *   arrives: from sky and sun, straight and by way of mirrors, and from all other facets, straight and by way of mirrors.
@@ -39,10 +39,10 @@
  *   written is followed by the number of entries that there is room for, which must be exactly what the call writes.
  * Structs.  Set those that start with struct_size by their init function (inline, below), outputs too, before the
  *   members that differ: a library that is newer than the header reads and writes no more than the header knows.
- * Stability.  The functions and structs of blik.h, blik_lights.h and blik_form_factor.h are stable: within a minor
- *   version nothing is taken away, and structs that are not called frozen may get members at their end. blik_plane.h may
- *   change with every minor version. While the major version is 0 a new minor version may change all of it; CHANGELOG.md
- *   says how callers adapt.
+ * Stability.  The functions and structs of blik.h, blik_lights.h, blik_update.h and blik_form_factor.h are stable:
+ *   within a minor version nothing is taken away, and structs that are not called frozen may get members at their end.
+ *   blik_plane.h may change with every minor version. While the major version is 0 a new minor version may change all of
+ *   it; CHANGELOG.md says how callers adapt.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */

@@ -7,6 +7,7 @@ use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
 use blik_kernel::arena::ALIGNMENT;
+use blik_kernel::coupling::kept::Fates;
 use blik_kernel::coupling::rows::RowSettings;
 use blik_kernel::coupling::{ABSENT, Block, Coupling, OPEN};
 use blik_kernel::element::Elements;
@@ -25,8 +26,12 @@ pub struct blik_coupling {
     pub(crate) settings: Settings,
     /// Rays of all rows.
     pub(crate) rays: u64,
+    /// What became of its rows.
+    pub(crate) fates: Fates,
+    /// Rays that were traced for them.
+    pub(crate) traced: u64,
     /// Bytes of the caller's memory up to the last that is used; 0: none of it is the caller's.
-    extent: usize,
+    pub(crate) extent: usize,
     #[cfg(feature = "std")]
     owner: Option<std::boxed::Box<Owned>>,
 }
@@ -86,13 +91,16 @@ impl blik_coupling {
         blocks: &'static [Block<'static>],
         settings: Settings,
     ) -> blik_coupling {
+        let rays = Coupling::part(blocks).rays();
         blik_coupling {
             tag: blik_coupling::TAG,
             base,
             elements,
             blocks,
             settings,
-            rays: Coupling::part(blocks).rays(),
+            rays,
+            fates: Fates { redone: elements.unknowns() as u64, ..Fates::default() },
+            traced: rays,
             extent: 0,
             #[cfg(feature = "std")]
             owner: None,
@@ -156,14 +164,19 @@ impl Default for blik_coupling_info {
 sized!(blik_coupling_info from facets);
 
 /// Cuts a block of `size` bytes, of alignment 64, off the front of what is left.
-struct Cutter {
-    start: *mut u8,
-    size: usize,
+pub(crate) struct Cutter {
+    pub start: *mut u8,
+    pub size: usize,
 }
 
 impl Cutter {
+    /// Of what stands behind a handle.
+    pub fn new(rest: &'static mut [u8]) -> Cutter {
+        Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) }
+    }
+
     /// Reserved for good.
-    fn take(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
+    pub fn take(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
         let size = size.next_multiple_of(ALIGNMENT);
         if size > self.size {
             return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(size, self.size));
@@ -176,7 +189,7 @@ impl Cutter {
     }
 
     /// Reserved at the end, until all else is made.
-    fn take_back(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
+    pub fn take_back(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
         let size = size.next_multiple_of(ALIGNMENT);
         let left = self.size.checked_sub(size);
         self.size = left.ok_or(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(size, self.size))?;
@@ -185,7 +198,7 @@ impl Cutter {
     }
 
     /// Lent until the next use: memory that nothing else holds.
-    fn lend<'a>(&self) -> &'a mut [u8] {
+    pub fn lend<'a>(&self) -> &'a mut [u8] {
         // SAFETY: within the caller's memory; callers drop it before they take.
         unsafe { core::slice::from_raw_parts_mut(self.start, self.size) }
     }
@@ -273,7 +286,11 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
 }
 
 /// A table of plain places in the caller's memory.
-fn table<T: Copy>(cutter: &mut Cutter, count: usize, value: T) -> Result<&'static mut [T], blik_error> {
+pub(crate) fn table<T: Copy>(
+    cutter: &mut Cutter,
+    count: usize,
+    value: T,
+) -> Result<&'static mut [T], blik_error> {
     let memory = cutter.take(count * size_of::<T>())?;
     const { assert!(align_of::<T>() <= ALIGNMENT) };
     let start = memory.as_mut_ptr().cast::<T>();
@@ -298,7 +315,7 @@ fn build(
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(least, given));
     }
     let (place, rest) = place::<blik_coupling>(memory)?;
-    let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() & !(ALIGNMENT - 1) };
+    let mut cutter = Cutter::new(rest);
     let planes = cutter.take_back(PlaneSides::bytes(&base.scene, settings.planes(base))?)?;
     let plane_sides = PlaneSides::new(&base.scene, &base.bvh, settings.planes(base), planes)?;
     let elements = elements(base, &plane_sides, settings, runner, &mut cutter)?;
@@ -486,7 +503,7 @@ impl blik_coupling {
 
 /// Building in memory of the library's own, as much as it takes.
 #[cfg(feature = "std")]
-mod owned {
+pub(crate) mod owned {
     use super::*;
     use blik_kernel::stages::BlockMemory;
     use std::boxed::Box;
@@ -512,21 +529,40 @@ mod owned {
         let (bvh, scene) = (&base.bvh, &base.scene);
         let rows =
             CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows, kept: None };
+        let (mut slabs, blocks) = fill(&rows, runner)?;
+        slabs.push(own);
+        place_blocks(slabs, &blocks, |blocks| blik_coupling::new(base, elements, blocks, *settings))
+    }
+
+    /// Computes all rows; the slabs in which the blocks stand, and these.
+    pub fn fill(
+        rows: &CouplingRows<'_>,
+        runner: &mut Runner,
+    ) -> Result<(Vec<Slab>, Vec<Block<'static>>), blik_error> {
         let mut pieces: Vec<Slabs> = (0..rows.pieces()).map(|_| Slabs::default()).collect();
         rows.fill(&mut pieces, runner)?;
-        let mut slabs: Vec<Slab> = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
-        // SAFETY: the handle owns the slabs.
+        let slabs: Vec<Slab> = pieces.into_iter().flat_map(|piece| piece.blocks).collect();
+        // SAFETY: the handle that is made of them owns the slabs.
         let blocks =
             slabs.iter().map(|s| Block::open(unsafe { s.bytes() })).collect::<Result<Vec<_>, _>>()?;
+        Ok((slabs, blocks))
+    }
+
+    /// A handle over blocks, which owns the slabs.
+    pub fn place_blocks(
+        mut slabs: Vec<Slab>,
+        blocks: &[Block<'static>],
+        handle: impl FnOnce(&'static [Block<'static>]) -> blik_coupling,
+    ) -> Result<*mut blik_coupling, blik_error> {
         let bytes = head::<blik_coupling>() + blocks.len() * size_of::<Block<'_>>() + ALIGNMENT;
         let mut front = Slab::new(bytes)?;
         // SAFETY: the handle owns the slab.
         let (place, rest) = place::<blik_coupling>(unsafe { front.bytes_mut() })?;
         let mut cutter = Cutter { start: rest.as_mut_ptr(), size: rest.len() };
         let kept = table(&mut cutter, blocks.len(), Block::EMPTY)?;
-        kept.copy_from_slice(&blocks);
-        slabs.extend([own, front]);
-        let mut handle = blik_coupling::new(base, elements, kept, *settings);
+        kept.copy_from_slice(blocks);
+        slabs.push(front);
+        let mut handle = handle(kept);
         handle.owner = Some(Box::new(Owned(slabs)));
         // SAFETY: `place` made room for it.
         unsafe { place.write(handle) };

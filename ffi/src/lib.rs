@@ -22,6 +22,7 @@ mod solution;
 mod status;
 mod text;
 mod types;
+mod update;
 mod view;
 
 pub use bake::*;
@@ -40,6 +41,7 @@ pub use solution::*;
 pub use status::*;
 pub use text::*;
 pub use types::*;
+pub use update::*;
 pub use view::*;
 
 #[cfg(all(feature = "panic-handler", not(feature = "std"), not(test)))]

@@ -11,6 +11,7 @@ use blik_kernel::Error;
 use blik_kernel::bvh::{AnswerBuffer, Bvh};
 use blik_kernel::math::Vec3;
 use blik_kernel::ray::Ray;
+use blik_kernel::scene::pose::Parts;
 use blik_kernel::scene::{Mesh, Scene};
 use blik_kernel::simd::Isa;
 use blik_kernel::stages::Executor;
@@ -138,6 +139,24 @@ fn size(mesh: &Reader) -> Result<usize, blik_error> {
 type Builder = fn(&[[Vec3; 3]], &[f64], Isa, &'static mut [u8]) -> Result<Bvh<'static>, Error>;
 
 fn build(mesh: &Reader, builder: Builder, memory: &'static mut [u8]) -> Result<*mut blik_scene, blik_error> {
+    build_at(mesh, None, builder, memory)
+}
+
+/// Builds a scene of a mesh whose parts stand elsewhere.
+pub(crate) fn posed(
+    mesh: &Reader,
+    parts: &Parts<'_>,
+    memory: &'static mut [u8],
+) -> Result<*mut blik_scene, blik_error> {
+    build_at(mesh, Some(parts), Bvh::build, memory)
+}
+
+fn build_at(
+    mesh: &Reader,
+    parts: Option<&Parts<'_>>,
+    builder: Builder,
+    memory: &'static mut [u8],
+) -> Result<*mut blik_scene, blik_error> {
     let needed = size(mesh)?;
     if memory.len() < needed {
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(needed, memory.len()));
@@ -145,7 +164,10 @@ fn build(mesh: &Reader, builder: Builder, memory: &'static mut [u8]) -> Result<*
     let (place, rest) = place::<blik_scene>(memory)?;
     let short = blik_error::of(BLIK_ERROR_INTERNAL);
     let (own, tree) = rest.split_at_mut_checked(Scene::bytes(mesh)?).ok_or(short)?;
-    let scene = Scene::new(mesh, own)?;
+    let scene = match parts {
+        None => Scene::new(mesh, own)?,
+        Some(parts) => Scene::posed(mesh, parts, own)?,
+    };
     let bvh = builder(scene.corners(), scene.areas(), Isa::detect(), tree)?;
     // SAFETY: `place` made room for it.
     unsafe { place.write(blik_scene::new(scene, bvh)) };
@@ -220,16 +242,28 @@ pub unsafe extern "C" fn blik_scene_create(
         let to = needed(scene)?;
         // SAFETY: by the caller's promise.
         let mesh = unsafe { Reader::new(mesh) }?;
-        let mut slab = Slab::new(size(&mesh)?)?;
-        // SAFETY: the handle owns the slab, or is never made.
-        let made = build(&mesh, Bvh::build_obvhs, unsafe { slab.bytes_mut() })?;
-        // SAFETY: just made, and not null.
-        unsafe {
-            (*made).owner = Some(std::boxed::Box::new(Owned(std::vec![slab])));
-            to.write(made);
-        }
+        let made = owned(&mesh, None, Bvh::build_obvhs)?;
+        // SAFETY: not null.
+        unsafe { to.write(made) };
         Ok(())
     })
+}
+
+/// Builds a scene in memory of its own.
+#[cfg(feature = "std")]
+fn owned(mesh: &Reader, parts: Option<&Parts<'_>>, builder: Builder) -> Result<*mut blik_scene, blik_error> {
+    let mut slab = Slab::new(size(mesh)?)?;
+    // SAFETY: the handle owns the slab, or is never made.
+    let made = build_at(mesh, parts, builder, unsafe { slab.bytes_mut() })?;
+    // SAFETY: just made.
+    unsafe { (*made).owner = Some(std::boxed::Box::new(Owned(std::vec![slab]))) };
+    Ok(made)
+}
+
+/// As [`posed`], in memory of its own: by the kernel's builder, which is sooner done.
+#[cfg(feature = "std")]
+pub(crate) fn owned_posed(mesh: &Reader, parts: &Parts<'_>) -> Result<*mut blik_scene, blik_error> {
+    owned(mesh, Some(parts), Bvh::build)
 }
 
 /// Ends a scene and frees what it owns.

@@ -101,6 +101,12 @@ pub const BLIK_ERROR_BODY: i32 = 29;
 /// Facet `index` emits or reflects (`field`) light for which the coupling has no entries: it was made for another material.
 pub const BLIK_ERROR_UNCOUPLED: i32 = 30;
 
+/// Facet `index` belongs to a part (`value`) that has no pose.
+pub const BLIK_ERROR_PART: i32 = 31;
+
+/// The pose of part `index` is not finite, or its matrix is no rotation.
+pub const BLIK_ERROR_POSE: i32 = 32;
+
 pub(crate) fn status_text(number: i32) -> &'static CStr {
     match number {
         BLIK_OK => c"done",
@@ -133,6 +139,8 @@ pub(crate) fn status_text(number: i32) -> &'static CStr {
         BLIK_ERROR_MEMORY => c"out of memory",
         BLIK_ERROR_INTERNAL => c"internal error",
         BLIK_ERROR_UNCOUPLED => c"the coupling has no entries for a facet's light",
+        BLIK_ERROR_PART => c"a facet's part has no pose",
+        BLIK_ERROR_POSE => c"a pose is not finite, or no rotation",
         BLIK_ERROR_BODY => c"a body of the plane model is not valid",
         _ => c"unknown status",
     }
@@ -306,6 +314,9 @@ pub const BLIK_FIELD_FACTORS: i32 = 53;
 /// Shares of facets in signatures.
 pub const BLIK_FIELD_SHARES: i32 = 54;
 
+/// Parts of a mesh.
+pub const BLIK_FIELD_PARTS: i32 = 55;
+
 pub(crate) fn field_text(number: i32) -> &'static CStr {
     match number {
         BLIK_FIELD_NONE => c"",
@@ -363,6 +374,7 @@ pub(crate) fn field_text(number: i32) -> &'static CStr {
         BLIK_FIELD_SAMPLES => c"samples",
         BLIK_FIELD_FACTORS => c"factors",
         BLIK_FIELD_SHARES => c"shares",
+        BLIK_FIELD_PARTS => c"parts",
         _ => c"",
     }
 }
@@ -417,6 +429,7 @@ impl From<Error> for blik_error {
                 let field = match what {
                     "facet_materials" => BLIK_FIELD_FACET_MATERIALS,
                     "facet_normals" => BLIK_FIELD_FACET_NORMALS,
+                    "parts" => BLIK_FIELD_PARTS,
                     _ => BLIK_FIELD_NONE,
                 };
                 e::of(BLIK_ERROR_LENGTH).field(field).sizes(expected, given)
@@ -453,6 +466,8 @@ impl From<Error> for blik_error {
             Error::Uncoupled { facet, field } => {
                 e::of(BLIK_ERROR_UNCOUPLED).field(number(field)).at(facet, 0, 0.0)
             }
+            Error::PartOutOfRange { facet, part, .. } => e::of(BLIK_ERROR_PART).at(facet, 0, part as f64),
+            Error::Pose { part } => e::of(BLIK_ERROR_POSE).at(part, 0, 0.0),
             Error::LightBandCount { field, expected, given } => {
                 e::of(BLIK_ERROR_LENGTH).field(number(field)).sizes(expected, given)
             }

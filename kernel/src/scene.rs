@@ -16,7 +16,7 @@ pub mod sun;
 use crate::base::arena::{Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, copy, pieces};
-use crate::base::math::{Vec3, fabs, sqrt, unit};
+use crate::base::math::{Vec3, sqrt, unit};
 
 pub use input::*;
 
@@ -327,26 +327,11 @@ impl<'m> Scene<'m> {
             && self.corner_normals == other.corner_normals
     }
 
-    /// Whether another scene has facets of the same areas, as one whose parts stand elsewhere.
-    pub fn has_areas_of(&self, other: &Scene<'_>) -> bool {
-        let whole = self.areas.iter().sum::<f64>() / (self.scale * self.scale);
-        let same = |facet: usize| {
-            let [a, b] = [self.area(facet), other.area(facet)];
-            fabs(a - b) <= AREA_SLACK * (a.max(b) + AREA_SLACK * whole)
-        };
-        let counted = self.facets() == other.facets() && self.sides == other.sides;
-        counted && self.bands == other.bands && (0..self.facets()).all(same)
-    }
-
     /// Bytes in use.
     pub fn memory(&self) -> usize {
         self.memory
     }
 }
-
-/// Difference up to which facets' areas count as the same, over the larger of both, and over as small a share of all: above what
-/// rotations known to 1e-6 and meshes far from the origin make of them.
-const AREA_SLACK: f64 = 1e-4;
 
 /// Facets whose corners have indices of normals.
 fn normal_facets(mesh: &dyn Mesh) -> usize {

@@ -19,7 +19,7 @@ pub use beams::Beams;
 pub use geometry::{BlockMemory, BlockPlace, least_bytes, places, refine};
 pub use light::{Lighting, Scratch, Sizes};
 pub use lights::{Alone, Explained, KeptSky, Lights};
-pub use update::{UpdateMemory, judge};
+pub use update::Update;
 
 use crate::base::error::Error;
 use core::num::NonZeroUsize;

@@ -90,6 +90,20 @@ int main() {
     REQUIRE(std::abs(shares - whole) < 1e-12 * whole && std::abs(terms - whole) < 1e-12 * whole);
     REQUIRE(why.by_diffuse[8] > 0 && why.by_emission[8] > 0);
 
+    // what is kept of a coupling where a part is moved: nothing of what it faces; all of it where both move as one
+    const blik_pose moved = blik::pose({1, 0, 0, 0}, {0, 0, 0.5});
+    for (const blik_pose &other : {blik::rest(), moved}) {
+        const blik::parts parts{{0, 0, 1, 1}, {other, moved}};
+        const blik::scene posed(mesh, parts);
+        const blik::coupling now(coupling, posed, parts, blik::threads(2));
+        REQUIRE(now.update().kept + now.update().redone == now.info().unknowns && now.update().rescaled == 0);
+        const blik::lit light = blik::lights(now, lights, directions);
+        const double was = all.signatures[3].radiant_intensity, is = light.signatures[3].radiant_intensity;
+        REQUIRE(std::abs(is - was) < 0.2 * was + all.signatures[3].error_estimate + light.signatures[3].error_estimate);
+    }
+    const blik::coupling same(coupling, scene);
+    REQUIRE(same.update().rays == 0 && same.update().redone == 0);
+
     std::vector<blik_ray> rays(1);
     rays[0] = {{0.5, 0.5, 2}, {0, 0, -1}, 1e9, BLIK_NO_FACET};
     std::vector<blik_hit> hits(1);

@@ -137,6 +137,19 @@ fn pixels_in_spite_of(fault: fn(u32) -> Fault, scene_too: bool) -> Vec<u32> {
             blik_solution_create(made.coupling, light, run, null_mut(), to)
         })
     });
+    let turned = blik_pose { translation: [0.0, 0.0, 0.2], ..REST };
+    with_parts(&inputs, turned, |parts| {
+        let mut scene = null_mut();
+        // SAFETY: as above.
+        let renewed = unsafe {
+            let posed = |mesh: &blik_mesh| blik_scene_pose_create(mesh, parts, null_mut(), &mut scene);
+            assert_eq!(with_mesh(&inputs, posed), BLIK_OK);
+            until_made("update", fault, |run, to| {
+                blik_update_create(made.coupling, scene, parts, run, null_mut(), to)
+            })
+        };
+        drop(Handles { scene, coupling: renewed, solution: null_mut() });
+    });
     for number in 1.. {
         let (mut written, before) = (None, BYTES.get());
         let done = disturbed(fault(number), |run| {

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The headers, by file name.
-pub const HEADERS: [&str; 4] = ["blik.h", "blik_lights.h", "blik_form_factor.h", "blik_plane.h"];
+pub const HEADERS: [&str; 5] =
+    ["blik.h", "blik_lights.h", "blik_update.h", "blik_form_factor.h", "blik_plane.h"];
 
 /// Columns of a line.
 const COLUMNS: usize = 120;

@@ -57,12 +57,20 @@ impl<'a> Motion<'a> {
         Need::new().and::<Bounds>(parts).and::<u32>(parts).and::<u8>(parts)
     }
 
-    /// Parts of a scene that stand where it has them, and are to stand at their poses.
+    /// Parts of a scene that stand where it has them, and in a new one at their poses.
     ///
     /// # Errors
-    /// Those of [`Parts::check`].
-    pub fn new(old: &'a Scene<'a>, parts: Parts<'a>, arena: &mut Arena<'a>) -> Result<Motion<'a>, Error> {
+    /// Those of [`Parts::check`]; [`Error::Mismatch`] where facets of the new scene stand elsewhere.
+    pub fn new(
+        old: &'a Scene<'a>,
+        new: &Scene<'_>,
+        parts: Parts<'a>,
+        arena: &mut Arena<'a>,
+    ) -> Result<Motion<'a>, Error> {
         parts.check(old.facets())?;
+        if old.facets() != new.facets() || !(0..old.facets()).all(|facet| stands(old, new, &parts, facet)) {
+            return Err(Error::Mismatch { what: "mesh" });
+        }
         let count = parts.poses.len();
         let boxes = arena.take::<Bounds>(count)?;
         let groups = arena.take::<u32>(count)?;
@@ -172,6 +180,21 @@ impl<'a> Motion<'a> {
                 && !enters(&bounds, carry.point(ray.origin), carry.turn(ray.direction))
         })
     }
+}
+
+/// Distance from its pose at which a facet's corner still stands there, over the size of the larger scene: above what rotations
+/// known to 1e-6 and meshes far from the origin make of it.
+const POSE_SLACK: f64 = 1e-5;
+
+/// Whether a facet of a new scene stands where its part's pose has it.
+fn stands(old: &Scene<'_>, new: &Scene<'_>, parts: &Parts<'_>, facet: usize) -> bool {
+    let pose = parts.pose(facet);
+    let slack = POSE_SLACK / old.scale().min(new.scale());
+    let corners = old.corners().at(facet).into_iter().zip(new.corners().at(facet));
+    corners.fold(true, |stands, (was, is)| {
+        let off = new.to_caller(is) - pose.point(old.to_caller(was));
+        stands && off.abs().max_element() <= slack
+    })
 }
 
 /// Whether a ray enters a box; true where rounding leaves it open.

@@ -1,17 +1,13 @@
 //! A coupling that is kept while materials change and parts move.
 
 use super::{Bytes, Clock, Geometry, GeometryMemory, Host, Report, Run, Seconds, blocks};
-use crate::base::arena::{Arena, Memory};
+use crate::base::arena::Memory;
 use crate::base::error::Error;
 use crate::coupling::Coupling;
-use crate::coupling::kept::{Change, Fates, Kept, ROW_REDONE};
-use crate::coupling::motion::Motion;
-use crate::coupling::plane_sides::PlaneSides;
 use crate::rays::bvh::Bvh;
 use crate::scene::pose::Parts;
 use crate::scene::{Scene, SceneInput};
-use crate::settings;
-use crate::stages::{self, CouplingRows, UpdateMemory};
+use crate::stages::Update;
 use std::vec::Vec;
 
 impl Host {
@@ -33,9 +29,6 @@ impl Host {
         let mut clock = Clock::start();
         memory.scene = Memory::new(Scene::bytes(input)?);
         let scene = Scene::new(input, memory.scene.bytes_mut())?;
-        if !scene.has_mesh_of(&kept.scene) {
-            return Err(Error::Mismatch { what: "mesh" });
-        }
         let seconds = Seconds { scene: clock.lap(), ..Seconds::default() };
         self.renewed(kept, (scene, kept.bvh), &mut memory.slabs, None, (seconds, clock))
     }
@@ -61,14 +54,11 @@ impl Host {
         let GeometryMemory { scene: scene_memory, bvh: bvh_memory, slabs, .. } = memory;
         *scene_memory = Memory::new(Scene::bytes(input)?);
         let scene = Scene::posed(input, parts, scene_memory.bytes_mut())?;
-        if !scene.has_areas_of(&kept.scene) {
-            return Err(Error::Mismatch { what: "mesh" });
-        }
         let mut seconds = Seconds { scene: clock.lap(), ..Seconds::default() };
         *bvh_memory = Memory::new(Bvh::bytes(scene.facets())?);
         let bvh = Bvh::build(scene.corners(), scene.areas(), self.isa, bvh_memory.bytes_mut())?;
         seconds.bvh = clock.lap();
-        self.renewed(kept, (scene, bvh), slabs, Some(parts), (seconds, clock))
+        self.renewed(kept, (scene, bvh), slabs, Some(*parts), (seconds, clock))
     }
 
     /// The coupling of a scene that differs from that of `kept` in materials and in the poses of parts.
@@ -77,7 +67,7 @@ impl Host {
         kept: &'n Geometry<'n>,
         (scene, bvh): (Scene<'n>, Bvh<'n>),
         slabs: &'n mut Vec<Memory>,
-        parts: Option<&Parts<'_>>,
+        parts: Option<Parts<'_>>,
         (seconds, mut clock): (Seconds, Clock),
     ) -> Result<Geometry<'n>, Error> {
         let (elements, settings, memory_budget) = (kept.elements, kept.settings, kept.memory_budget);
@@ -86,33 +76,23 @@ impl Host {
         (report.rays.visibility, report.pairs, report.certified) = Default::default();
         report.skipped.clear();
         let (matrix, mut run) = (kept.coupling()?, Run::new(self));
-        let mut scratch = Memory::new(UpdateMemory::need(&kept.scene, &elements).bytes()?);
-        let UpdateMemory { mut change, fates } =
-            UpdateMemory::take(&kept.scene, &elements, scratch.bytes_mut())?;
-        let mut moved = Memory::new(Motion::need(parts.map_or(0, |parts| parts.poses.len())).bytes()?);
-        let mut moved = Arena::new(moved.bytes_mut(), 0)?;
-        let motion = parts.map(|parts| Motion::new(&kept.scene, *parts, &mut moved)).transpose()?;
-        let all = settings.rows(&scene).all;
-        let change = Change::new(&kept.scene, &scene, &elements, all, &mut change)?;
-        let change = change.moved(motion.as_ref(), settings.directional);
-        let blocks = if change.is_diffuse_alone(&matrix) {
-            report.rows = Fates { kept: elements.unknowns() as u64, ..Fates::default() };
-            kept.blocks.clone()
-        } else {
-            report.rows = stages::judge(&change, &matrix, fates, &mut run)?;
-            let rows = settings.rows_within(&scene, elements.unknowns());
-            let wanted = report.rows.redone > 0 && settings::planes(&scene, &rows);
-            let mut planes = Memory::new(PlaneSides::bytes(&scene, wanted)?);
-            let plane_sides = &PlaneSides::new(&scene, &bvh, wanted, planes.bytes_mut())?;
-            let kept = Some(Kept { coupling: &matrix, change: &change, fates });
-            let rows =
-                CouplingRows { scene: &scene, bvh: &bvh, elements: &elements, plane_sides, rows, kept };
-            blocks(&rows, memory_budget, slabs, &mut run)?
+        let update = Update {
+            old: &kept.scene,
+            elements: &elements,
+            coupling: &matrix,
+            settings: &settings,
+            scene: &scene,
+            bvh: &bvh,
+            parts,
         };
+        let mut scratch = Memory::new(update.bytes()?);
+        let (blocks, fates, each) = update.run(scratch.bytes_mut(), &mut run, |rows, run| match rows {
+            Some(rows) => blocks(rows, memory_budget, slabs, run),
+            None => Ok(kept.blocks.clone()),
+        })?;
         let coupling = Coupling::new(&blocks, elements.unknowns())?;
-        let redone = |(unknown, _): &(usize, _)| fates.get(*unknown).is_some_and(|fate| *fate == ROW_REDONE);
-        let rows = coupling.rows(0..elements.unknowns()).filter(redone);
-        report.rays.visibility = rows.map(|(_, row)| row.row.all_rays()).sum();
+        report.rows = fates;
+        report.rays.visibility = Update::rays(&coupling, each);
         report.count_rows(&coupling);
         report.count_scene(&scene, settings.directional, elements.unknowns());
         report.bytes.coupling = coupling.memory() + elements.memory();

@@ -9,6 +9,7 @@ use crate::base::math::{Vec3, fabs, sqrt};
 const ROTATION_SLACK: f64 = 1e-6;
 
 /// Where a rigid part stands: what is at x in the mesh is at R x + t.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// The rows of the rotation R.
