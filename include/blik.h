@@ -39,10 +39,10 @@
  *   written is followed by the number of entries that there is room for, which must be exactly what the call writes.
  * Structs.  Set those that start with struct_size by their init function (inline, below), outputs too, before the
  *   members that differ: a library that is newer than the header reads and writes no more than the header knows.
- * Stability.  The functions and structs of blik.h, blik_lights.h, blik_update.h and blik_form_factor.h are stable: within a minor
- *   version nothing is taken away, and structs that are not called frozen may get members at their end. blik_plane.h may
- *   change with every minor version. While the major version is 0 a new minor version may change all of it; CHANGELOG.md
- *   says how callers adapt.
+ * Stability.  The functions and structs of blik.h, blik_lights.h, blik_update.h and blik_form_factor.h are stable:
+ *   within a minor version nothing is taken away, and structs that are not called frozen may get members at their end.
+ *   blik_plane.h may change with every minor version. While the major version is 0 a new minor version may change all of
+ *   it; CHANGELOG.md says how callers adapt.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
@@ -194,7 +194,7 @@ typedef enum blik_field {
     BLIK_FIELD_SAMPLES = 52, /* Samples of the plane model. */
     BLIK_FIELD_FACTORS = 53, /* Form factors. */
     BLIK_FIELD_SHARES = 54, /* Shares of facets in signatures. */
-    BLIK_FIELD_PARTS = 55, /* See blik_error. */
+    BLIK_FIELD_PARTS = 55, /* Parts of a mesh. */
     BLIK_FIELD_MAX_ENUM = 0x7fffffff
 } blik_field;
 

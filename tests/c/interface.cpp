@@ -91,9 +91,9 @@ int main() {
     REQUIRE(why.by_diffuse[8] > 0 && why.by_emission[8] > 0);
 
     // what is kept of a coupling where a part is moved: nothing of what it faces; all of it where both move as one
-    const blik_pose moved = blik::pose({1, 0, 0, 0}, {0, 0, 0.5});
-    for (const blik_pose &other : {blik::rest(), moved}) {
-        const blik::parts parts{{0, 0, 1, 1}, {other, moved}};
+    const blik_pose lifted = blik::pose({1, 0, 0, 0}, {0, 0, 0.5});
+    for (const blik_pose &other : {blik::rest(), lifted}) {
+        const blik::parts parts{{0, 0, 1, 1}, {other, lifted}};
         const blik::scene posed(mesh, parts);
         const blik::coupling now(coupling, posed, parts, blik::threads(2));
         REQUIRE(now.update().kept + now.update().redone == now.info().unknowns && now.update().rescaled == 0);
@@ -101,8 +101,8 @@ int main() {
         const double was = all.signatures[3].radiant_intensity, is = light.signatures[3].radiant_intensity;
         REQUIRE(std::abs(is - was) < 0.2 * was + all.signatures[3].error_estimate + light.signatures[3].error_estimate);
     }
-    const blik::coupling same(coupling, scene);
-    REQUIRE(same.update().rays == 0 && same.update().redone == 0);
+    const blik::coupling unmoved(coupling, scene);
+    REQUIRE(unmoved.update().rays == 0 && unmoved.update().redone == 0);
 
     std::vector<blik_ray> rays(1);
     rays[0] = {{0.5, 0.5, 2}, {0, 0, -1}, 1e9, BLIK_NO_FACET};
