@@ -29,7 +29,10 @@ RULES = [
     (r"^blik::plane::Lanes::rows::", r"^blik::plane::(coupling::build|solution::build|view::trace)::\{\{closure\}\}$"),
     (r"^blik::plane::view::trace::", r"^blik::plane::view::blik_plane_(image|radiance)::"),
     # a mesh and a tracer of the caller's
-    (r"^blik_kernel::scene::", r"^<blik::mesh::Reader as blik_kernel::scene::input::Mesh>::"),
+    (
+        r"^blik_kernel::scene::",
+        r"^<(blik::mesh::Reader|blik_kernel::scene::pose::PosedMesh<M>) as blik_kernel::scene::input::Mesh>::",
+    ),
     (
         r"^blik_kernel::rays::bvh::external::",
         r"^<blik::intersector::Caller as blik_kernel::rays::bvh::external::Intersector>::",

@@ -1,6 +1,6 @@
 //! Rigid parts of a mesh: which facets move together, and where they stand.
 
-use super::{MaterialInput, Mesh, NO_NORMAL, Scene, check, corner_normals};
+use super::{MaterialInput, Mesh, NO_NORMAL, Scene, check};
 use crate::base::error::Error;
 use crate::base::index::Index;
 use crate::base::math::{Vec3, fabs, sqrt};
@@ -140,25 +140,30 @@ impl Parts<'_> {
 }
 
 /// A mesh whose parts are moved: each facet has corners of its own.
-struct PosedMesh<'a> {
-    mesh: &'a dyn Mesh,
+struct PosedMesh<'a, M> {
+    mesh: &'a M,
     parts: &'a Parts<'a>,
 }
 
-impl PosedMesh<'_> {
-    /// The facet and the corner of a vertex.
-    fn corner(index: usize) -> (usize, usize) {
-        (index / 3, index % 3)
+/// The facet and the corner of a vertex of a [`PosedMesh`].
+fn corner_of(index: usize) -> (usize, usize) {
+    (index / 3, index % 3)
+}
+
+impl<M: Mesh> PosedMesh<'_, M> {
+    /// Indices of the normals at a facet's corners, in the mesh.
+    fn told(&self, facet: usize) -> [u32; 3] {
+        if self.mesh.facet_normals() > 0 { self.mesh.facet_normal(facet) } else { self.mesh.facet(facet) }
     }
 }
 
-impl Mesh for PosedMesh<'_> {
+impl<M: Mesh> Mesh for PosedMesh<'_, M> {
     fn vertices(&self) -> usize {
         self.mesh.facets().saturating_mul(3)
     }
 
     fn vertex(&self, index: usize) -> [f64; 3] {
-        let (facet, corner) = PosedMesh::corner(index);
+        let (facet, corner) = corner_of(index);
         let vertex = self.mesh.vertex(self.mesh.facet(facet).at(corner) as usize);
         let pose = self.parts.pose(facet);
         if *pose == Pose::REST { vertex } else { pose.point(Vec3::from_array(vertex)).to_array() }
@@ -185,8 +190,8 @@ impl Mesh for PosedMesh<'_> {
     }
 
     fn normal(&self, index: usize) -> [f64; 3] {
-        let (facet, corner) = PosedMesh::corner(index);
-        let told = corner_normals(self.mesh, facet).at(corner) as usize;
+        let (facet, corner) = corner_of(index);
+        let told = self.told(facet).at(corner) as usize;
         if told >= self.mesh.normals() {
             // of a corner that has none: it is never asked for
             return Vec3::Z.to_array();
@@ -199,7 +204,7 @@ impl Mesh for PosedMesh<'_> {
     }
 
     fn facet_normal(&self, facet: usize) -> [u32; 3] {
-        let told = corner_normals(self.mesh, facet);
+        let told = self.told(facet);
         [0, 1, 2]
             .map(|corner| if told.at(corner) == NO_NORMAL { NO_NORMAL } else { (3 * facet + corner) as u32 })
     }
@@ -226,7 +231,7 @@ impl<'m> Scene<'m> {
     ///
     /// # Errors
     /// Those of [`Scene::new`] and of [`Parts::check`]; [`Error::VertexNotFinite`] where a vertex is moved beyond all numbers.
-    pub fn posed(mesh: &dyn Mesh, parts: &Parts<'_>, memory: &'m mut [u8]) -> Result<Scene<'m>, Error> {
+    pub fn posed<M: Mesh>(mesh: &M, parts: &Parts<'_>, memory: &'m mut [u8]) -> Result<Scene<'m>, Error> {
         check::sizes(mesh)?;
         check::materials(mesh)?;
         check::mesh(mesh)?;
@@ -237,7 +242,7 @@ impl<'m> Scene<'m> {
         }
         match Scene::new(&PosedMesh { mesh, parts }, memory) {
             Err(Error::VertexNotFinite { vertex }) => {
-                let (facet, corner) = PosedMesh::corner(vertex);
+                let (facet, corner) = corner_of(vertex);
                 Err(Error::VertexNotFinite { vertex: mesh.facet(facet).at(corner) as usize })
             }
             made => made,
