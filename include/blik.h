@@ -92,7 +92,7 @@ BLIK_API const char *blik_build_info(void);
 
 /* ---- Errors ------------------------------------------------------------------------------------------------------ */
 
-/* What a call returns: whether it was done, and if not, why. */
+/* Status that a call returns: whether it was done, and if not, why. */
 typedef enum blik_status {
     BLIK_OK = 0, /* Done. */
     BLIK_ERROR_NULL = 1, /* A pointer that must not be null is. */
@@ -136,7 +136,7 @@ typedef enum blik_status {
     BLIK_STATUS_MAX_ENUM = 0x7fffffff
 } blik_status;
 
-/* What a refused call is about. */
+/* Field that a refused call is about. */
 typedef enum blik_field {
     BLIK_FIELD_NONE = 0, /* No field. */
     BLIK_FIELD_DIFFUSE = 1, /* Diffuse reflectance of a material. */
@@ -171,7 +171,7 @@ typedef enum blik_field {
     BLIK_FIELD_BODY_RADIUS = 30, /* Radius of a body of the plane model. */
     /* Coordinates of a body of the plane model: not finite, beyond 1e100, too few points, or two that coincide. */
     BLIK_FIELD_BODY_POINTS = 31,
-    BLIK_FIELD_TALLY = 32, /* What a tally says of errors. */
+    BLIK_FIELD_TALLY = 32, /* Errors in a tally. */
     BLIK_FIELD_VERTICES = 33, /* The mesh's vertices. */
     BLIK_FIELD_FACETS = 34, /* The mesh's facets. */
     BLIK_FIELD_FACET_MATERIALS = 35, /* The materials of the mesh's facets. */
@@ -198,11 +198,11 @@ typedef enum blik_field {
     BLIK_FIELD_MAX_ENUM = 0x7fffffff
 } blik_field;
 
-/* What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
+/* Error of a refused call. Written where a call is refused and the pointer to it is not null; nothing has
  * to be set before. Frozen: it does not grow. */
 typedef struct blik_error {
     blik_status status; /* The status that the call returned. */
-    blik_field field; /* What it is about. */
+    blik_field field; /* The field that it is about. */
     size_t index; /* Index of the facet, vertex, normal, material, ray or direction that it is about; else 0. */
     size_t band; /* Spectral band; else 0. */
     double value; /* The offending value; else 0. */
@@ -210,7 +210,7 @@ typedef struct blik_error {
     size_t given; /* Bytes or entries given; else 0. */
 } blik_error;
 
-/* What a refused call tells, in one line without its end: status, field, value, index, sizes.
+/* Text of a refused call's error, in one line without its end: status, field, value, index, sizes.
  *
  * Returns the length of the whole text, as snprintf does: where it is not below size, the text was cut.
  *
@@ -498,7 +498,7 @@ BLIK_API blik_status blik_scene_set_intersector(blik_scene *scene, const blik_in
 
 /* ---- Coupling: extended form factors between the elements of a scene --------------------------------------------- */
 
-/* What decides the coupling besides the scene. */
+/* Settings of a coupling. */
 typedef struct blik_settings {
     size_t struct_size; /* Size of this struct. */
     /* The wanted rms error of an image's pixels relative to the reference radiance: 1e-6 to 0.1; default 2e-3. */
@@ -797,7 +797,7 @@ typedef enum blik_projection {
     BLIK_PROJECTION_MAX_ENUM = 0x7fffffff
 } blik_projection;
 
-/* What a pixel of a blik_camera shows. */
+/* Sampling of a pixel of a blik_camera. */
 typedef enum blik_sampling {
     BLIK_SAMPLE_AREA = 0, /* Mean radiance over the pixel's square, background included. */
     BLIK_SAMPLE_CENTRE = 1, /* Radiance along the ray through the pixel's centre. */
@@ -811,7 +811,7 @@ typedef struct blik_camera {
     blik_sampling sampling; /* BLIK_SAMPLE_AREA (default) or BLIK_SAMPLE_CENTRE. */
     double eye[3]; /* Position of the eye, in the mesh's coordinates. */
     double target[3]; /* The point in the image's middle. */
-    double up[3]; /* What is up in the image; default (0, 0, 1). */
+    double up[3]; /* Direction that is up in the image; default (0, 0, 1). */
     double height; /* Orthographic: height of the image in the mesh's unit. */
     double fov_deg; /* Perspective: vertical field of view in degrees. */
     size_t columns; /* Pixels across, 1 to 65536. */
@@ -834,7 +834,7 @@ static inline void blik_camera_init(blik_camera *camera)
     camera->rows = 0;
 }
 
-/* What was done on rows of an image; tallies of all its rows add up by blik_tally_add. */
+/* Counts of the work on rows of an image; tallies of all its rows add up by blik_tally_add. */
 typedef struct blik_tally {
     size_t struct_size; /* Size of this struct. */
     uint64_t object_pixels; /* Pixels whose centre ray meets the object. */
@@ -924,7 +924,7 @@ typedef enum blik_limit {
     BLIK_LIMIT_MAX_ENUM = 0x7fffffff
 } blik_limit;
 
-/* What comes back with an image. */
+/* Report of an image: work that was done, error estimates and bounds. */
 typedef struct blik_report {
     size_t struct_size; /* Size of this struct. */
     double tolerance; /* The wanted error, of the solution where images have one of their own. */
@@ -1039,7 +1039,7 @@ BLIK_API blik_status blik_radiance(const blik_solution *solution, const blik_ray
     const blik_run *run, void *scratch, size_t scratch_size, blik_error *error, double *radiance,
     size_t radiance_count);
 
-/* What a distant observer measures in one direction and band. Arrays of it have a stride: it may grow. */
+/* Signature in one direction and band, as a distant observer measures it. Arrays of it have a stride: it may grow. */
 typedef struct blik_signature {
     double radiant_intensity; /* Radiant intensity toward the observer, W/sr. */
     double projected_area; /* Area of the object's projection, in the square of the mesh's unit. */
@@ -1052,7 +1052,7 @@ typedef struct blik_signature {
     double unresolved_glints;
 } blik_signature;
 
-/* What distant observers measure of the whole object, without an image.
+/* Signatures of the whole object, as distant observers measure them, without an image.
  *
  *   solution          the solution
  *   directions        three numbers a view, from the observer toward the object, of any length but zero

@@ -119,19 +119,27 @@ fn a_finely_cut_furnace_is_as_bright_as_a_coarse_one() {
 
 #[test]
 fn the_mesh_changes_no_image() {
+    mesh_changes_no_image(true);
+}
+
+#[test]
+#[ignore = "half a minute: of facets with one side, as in the other tests"]
+fn the_mesh_changes_no_image_of_one_sided_facets() {
+    mesh_changes_no_image(false);
+}
+
+fn mesh_changes_no_image(two_sided: bool) {
     let settings = Settings { image_tolerance: Some(4e-3), ..within(TOLERANCE) };
-    for two_sided in [false, true] {
-        let [coarse, fine] = [0, 3].map(|levels| Case { two_sided, ..scene(levels) });
-        let coarse = coarse.run(2, &settings, &camera());
-        let fine = fine.run(2, &settings, &camera());
-        assert!(fine.lit.elements < 5000, "clusters: {}", fine.lit.elements);
-        let (a, b) = (coarse.image.report.error_estimate, fine.image.report.error_estimate);
-        let apart = rms(&coarse.image.pixels, &fine.image.pixels) / fine.image.report.reference_radiance[0];
-        println!("{apart:.2e} apart, estimates {a:.2e} and {b:.2e}");
-        // each estimate is of its own image; the difference of independent errors is their hypot
-        assert!(apart <= a.hypot(b), "{apart:.2e} apart, estimates {a:.2e} and {b:.2e}");
-        assert!(b <= 2.0 * 4e-3, "estimate {b:.2e}");
-    }
+    let [coarse, fine] = [0, 3].map(|levels| Case { two_sided, ..scene(levels) });
+    let coarse = coarse.run(2, &settings, &camera());
+    let fine = fine.run(2, &settings, &camera());
+    assert!(fine.lit.elements < 5000, "clusters: {}", fine.lit.elements);
+    let (a, b) = (coarse.image.report.error_estimate, fine.image.report.error_estimate);
+    let apart = rms(&coarse.image.pixels, &fine.image.pixels) / fine.image.report.reference_radiance[0];
+    println!("{apart:.2e} apart, estimates {a:.2e} and {b:.2e}");
+    // each estimate is of its own image; the difference of independent errors is their hypot
+    assert!(apart <= a.hypot(b), "{apart:.2e} apart, estimates {a:.2e} and {b:.2e}");
+    assert!(b <= 2.0 * 4e-3, "estimate {b:.2e}");
 }
 
 #[test]
@@ -165,7 +173,7 @@ fn irradiance_is_each_facets_own() {
 fn threads_change_no_bit() {
     let case = scene(3);
     let settings = within(TOLERANCE);
-    let camera = CameraInput { rows: 24, columns: 24, ..camera() };
+    let camera = CameraInput { rows: 12, columns: 12, ..camera() };
     let [one, three] = [1, 3].map(|threads| case.run(threads, &settings, &camera));
     assert_eq!(one.pixel_bits(), three.pixel_bits());
     assert_eq!(one.facet_bits(), three.facet_bits());

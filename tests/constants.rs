@@ -109,6 +109,28 @@ fn no_name_stands_twice_and_each_has_a_comment() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Words in the names of constants that were tuned, or that bound an error.
+const TUNED: [&str; 8] = ["MOST", "LEAST", "FEWEST", "FACTOR", "SHARE", "ERROR", "ROUNDING", "SLACK"];
+
+/// Whether a file of the kernel defines a constant of [`TUNED`] and names no command that measures it, neither above the
+/// constant nor on its front.
+fn is_unmeasured(source: &str) -> bool {
+    let tuned = constants(source).iter().any(|c| TUNED.iter().any(|word| c.name.contains(word)));
+    tuned && !source.lines().any(|line| line.contains("//") && line.contains("cargo "))
+}
+
+#[test]
+fn tuned_constants_name_the_command_that_measures_them() {
+    // limits of what is accepted, not tuned
+    let limits = ["kernel/src/scene/input.rs"];
+    let sources = sources();
+    let files = sources.iter().filter(|(file, _)| file.starts_with("kernel") && !limits.contains(&&**file));
+    let faults: Vec<_> = files.filter(|(_, source)| is_unmeasured(source)).map(|(file, _)| file).collect();
+    assert!(faults.is_empty(), "no command that measures the constants of {faults:?}");
+    assert!(is_unmeasured("/// Most rays.\nconst RAYS_MOST: u32 = 1;\n"));
+    assert!(!is_unmeasured("/// Most rays: `cargo bench`.\nconst RAYS_MOST: u32 = 1;\n"));
+}
+
 #[test]
 fn comments_name_what_they_speak_of() {
     let mut faults = Vec::new();

@@ -558,7 +558,8 @@ fn forged_blocks_do_no_harm() {
 #[test]
 fn odd_numbers_are_refused_or_shown_finite() {
     let (end, mut random, mut shown, mut tries, mut posed) = (until(), Random(2), 0, 0, 0);
-    while tries < 400 || Instant::now() < end {
+    // some tenths of a second each: .ci/long goes on for half an hour
+    while tries < 200 || Instant::now() < end {
         tries += 1;
         let mut inputs = Inputs::new();
         inputs.spoil(&mut random);
@@ -588,8 +589,8 @@ fn odd_numbers_are_refused_or_shown_finite() {
         assert_eq!(explain(made.coupling, &inputs, null()).is_err(), counted, "{inputs:?}");
     }
     println!("{shown} of {tries} inputs shown, {posed} with a part moved");
-    assert!(posed > 5, "{posed} of {tries}");
-    assert!(shown > 20, "{shown} of {tries}");
+    assert!(posed > 2, "{posed} of {tries}");
+    assert!(10 * shown > tries / 2, "{shown} of {tries}");
 }
 
 /// Whatever the numbers of a ray, all who take rays agree on whether it is one, and answer with numbers.

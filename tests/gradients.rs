@@ -38,7 +38,7 @@ fn case(mirrors: bool) -> Case {
 /// Settings by which the solver goes on to rounding.
 fn converged(tolerance: f64) -> Settings {
     let mut settings = Settings::new(tolerance, None).unwrap();
-    settings.budget.solver = 1e-15;
+    (settings.budget.solver, settings.budget.solver_accelerated) = (1e-15, 1e-17);
     settings
 }
 

@@ -67,6 +67,17 @@ fn glossy(diffuse: f64, specular: f64, ratio: f64) -> Material {
 
 #[test]
 fn agrees_with_the_twin() {
+    agrees(128);
+}
+
+#[test]
+#[ignore = "minutes: more rays of the twin"]
+fn agrees_with_the_twin_of_more_rays() {
+    agrees(1024);
+}
+
+/// Scenes of all kinds, `rays` rays of the twin at each reflection.
+fn agrees(rays: usize) {
     let overcast = || Sky::new(Model::Overcast, 1.0, 0.3);
     let sun = |half: f64| Sun::new(dvec3(0.4, 0.3, 0.8), 2.0, half.to_radians());
     let outside = camera([3.0, 2.6, 2.2], [0.4, 0.4, 0.4], 1.7, 8);
@@ -104,11 +115,19 @@ fn agrees_with_the_twin() {
         ("ball of mirrors, point sun", Scene::new(&over_floor, &shiny).sun(sun(0.0)), &above),
         ("ball of mirrors, disc", Scene::new(&over_floor, &shiny).sky(overcast()).sun(sun(2.0)), &above),
     ];
-    for (name, scene, camera) in &cases {
-        // the twin tries a thousand images of the sun where mirrors lie in many planes
-        let rays = if name.starts_with("ball") { 16 } else { 256 };
-        agree(name, scene, camera, rays);
-    }
+    // two at once: no other test here takes as long
+    std::thread::scope(|scope| {
+        for half in [0, 1] {
+            let cases = cases.iter().skip(half).step_by(2);
+            scope.spawn(move || {
+                for (name, scene, camera) in cases {
+                    // the twin tries a thousand images of the sun where mirrors lie in many planes
+                    let rays = if name.starts_with("ball") { rays / 16 } else { rays };
+                    agree(name, scene, camera, rays);
+                }
+            });
+        }
+    });
 }
 
 #[test]

@@ -204,9 +204,20 @@ fn smooth_sphere(rows: usize, columns: usize) -> (scenes::Mesh, Vec<[f64; 3]>) {
 /// does a narrow lobe, but for what of it lies on the far side of the terminator.
 #[test]
 fn spheres_show_the_sun_at_every_phase() {
+    spheres_show_the_sun(6);
+}
+
+#[test]
+#[ignore = "half a minute: more suns and views"]
+fn spheres_show_more_suns() {
+    spheres_show_the_sun(30);
+}
+
+/// Discs of three sizes by turns, in mirrors and lobes by turns.
+fn spheres_show_the_sun(suns: usize) {
     let (mesh, normals) = smooth_sphere(96, 192);
     let mut rng = Rng(31);
-    for number in 0..14 {
+    for number in 0..suns {
         let half = [0.2665f64, 0.01, 2.0][number % 3].to_radians();
         let lobe = number % 2 == 1;
         let material = Material { gloss: lobe.then_some(3e3), ..Material::new(0.0, 0.8) };
@@ -310,6 +321,16 @@ fn flat_mirrors_show_the_sun_whole() {
 /// lines. Nineteen of twenty are within their error.
 #[test]
 fn signatures_are_within_their_error() {
+    within_their_error(4);
+}
+
+#[test]
+#[ignore = "a minute: more views of each scene"]
+fn signatures_of_many_views_are_within_their_error() {
+    within_their_error(20);
+}
+
+fn within_their_error(views: usize) {
     let mut rng = Rng(33);
     let mesh = scenes::sphere(3).joined(&scenes::cube_outside().scaled(1.4).translated([0.6, -0.9, -0.4]));
     let (mut held, mut all, mut over) = (0, 0, 0.0);
@@ -322,7 +343,7 @@ fn signatures_are_within_their_error() {
         solve(&scene, &within(5e-3), |host, lit| {
             let solved = lit.solved();
             let mut scratch = vec![0; signature::scratch_bytes().unwrap()];
-            for _ in 0..10 {
+            for _ in 0..views {
                 let view = Vec3::from_array(anywhere(&mut rng).to_array());
                 let report = host.signature(lit, view).unwrap().0;
                 let fine = View::new(&solved, view, 700).unwrap();

@@ -86,3 +86,67 @@ fn a_later_wing_is_found() {
     assert!(fault("view", "use crate::rays::bvh::Bvh; use crate::nowhere::X;").is_some());
     assert!(fault("view", "use crate::rays::bvh::Bvh;").is_none());
 }
+
+/// The files that a page names in backticks, each with the items named in brackets behind it.
+fn places(page: &str) -> Vec<(String, Vec<String>)> {
+    let mut found: Vec<(String, Vec<String>)> = Vec::new();
+    for cell in page.lines().filter(|line| line.starts_with('|')).flat_map(|line| line.split('|')) {
+        // the odd parts stand in backticks
+        let mut inside = false;
+        for (number, part) in cell.split('`').enumerate() {
+            if number % 2 == 0 {
+                inside = part.trim_end().ends_with('(') || inside && !part.contains(')');
+            } else if part.ends_with(".rs") {
+                found.push((part.to_string(), Vec::new()));
+                inside = false;
+            } else if inside && let Some((_, items)) = found.last_mut() {
+                items.push(part.rsplit("::").next().unwrap().to_string());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_readme_names_files_and_items_that_are_there() {
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let root = above.map(Path::to_path_buf).find(|p| p.join("kernel/src").is_dir()).unwrap();
+    let mut faults = Vec::new();
+    let mut items_checked = 0;
+    for page in ["kernel/README.md", ".github/CONTRIBUTING.md"] {
+        let text = fs::read_to_string(root.join(page)).unwrap();
+        let places = places(&text);
+        assert!(places.len() > 20, "{page}: {} files", places.len());
+        for (file, items) in places {
+            // a wing's own table names files below the wing
+            let wings = ORDER.iter().map(|wing| root.join("kernel/src").join(wing));
+            let folders = ["", "kernel/src", "kernel/src/scene"].map(|folder| root.join(folder));
+            let mut folders = folders.into_iter().chain(wings);
+            let found = folders.find_map(|folder| Some(folder.join(&file)).filter(|path| path.is_file()));
+            let Some(path) = found else {
+                let parts = ["kernel/src", "kernel/examples"].map(|f| root.join(f));
+                let mut all = Vec::new();
+                parts.iter().for_each(|folder| files(folder, &mut all));
+                if !all.iter().any(|path| path.ends_with(&file)) {
+                    faults.push(format!("{page}: no file {file}"));
+                }
+                continue;
+            };
+            let source = fs::read_to_string(path).unwrap();
+            for item in items {
+                items_checked += 1;
+                let defined =
+                    ["fn ", "struct ", "enum ", "trait ", "const "].map(|kind| format!("{kind}{item}"));
+                // words of code stand for themselves
+                let is_there = item.contains(' ') && source.contains(&item);
+                if !is_there && !defined.iter().any(|d| source.contains(d)) {
+                    faults.push(format!("{page}: {file} has no {item}"));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty() && items_checked > 8, "{items_checked} items\n{}", faults.join("\n"));
+    let row = "| a | `x.rs` (`One`, `Two::three`) | `y.rs` |";
+    let both = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<Vec<_>>();
+    assert_eq!(places(row), [("x.rs".to_string(), both(&["One", "three"])), ("y.rs".to_string(), vec![])]);
+}

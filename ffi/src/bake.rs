@@ -18,7 +18,7 @@ use core::ptr::{NonNull, null_mut};
 pub const BLIK_BLOCK_ALIGNMENT: usize = 64;
 const _: () = assert!(BLIK_BLOCK_ALIGNMENT == ALIGNMENT);
 
-/// What is to be baked.
+/// Content of a block to be baked.
 fn baked(
     coupling: &'static blik_coupling,
     solution: Option<&'static blik_solution>,

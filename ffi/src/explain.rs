@@ -4,16 +4,17 @@ use crate::call;
 use crate::coupling::blik_coupling;
 use crate::lights::coupled;
 use crate::memory::*;
-use crate::run::blik_run;
-use crate::solution::given_light;
+use crate::run::{Runner, blik_run};
+use crate::solution::coupling_and_light;
 use crate::status::*;
 use crate::types::*;
 use crate::view::{Signatures, blik_signature, signatures_of, wanted_cells, with_scratch};
 use blik_kernel::Error;
 use blik_kernel::importance::TERMS;
+use blik_kernel::light::{Light, LightInput};
 use blik_kernel::math::Vec3;
 use blik_kernel::scene::MAX_BANDS;
-use blik_kernel::stages::Explained;
+use blik_kernel::stages::{Explained, Lights};
 use core::ffi::c_void;
 
 /// Bytes of scratch memory for [`blik_explain`]. More is for scenes with mirrors that scatter sunlight.
@@ -34,10 +35,7 @@ pub unsafe extern "C" fn blik_explain_scratch_size(
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
-        let (coupling, given) = unsafe {
-            let coupling: &blik_coupling = object(coupling)?;
-            (coupling, given_light(light, &coupling.base.scene)?)
-        };
+        let (coupling, given) = unsafe { coupling_and_light(coupling, light) }?;
         let matrix = coupling.matrix()?;
         let size = coupled(coupling, &matrix).explain_bytes(&given.light(&coupling.base.scene)?)?;
         // SAFETY: not null.
@@ -101,57 +99,97 @@ pub unsafe extern "C" fn blik_explain(
 ) -> blik_status {
     call(error, || {
         // SAFETY: by the caller's promise.
-        let (coupling, given) = unsafe {
-            let coupling: &blik_coupling = object(coupling)?;
-            (coupling, &given_light(light, &coupling.base.scene))
-        };
+        let given = &unsafe { coupling_and_light(coupling, light) };
         // lights in one place of the stack each: they are large
-        let given = given.as_ref().map_err(|error| *error)?;
+        let (coupling, given) = given.as_ref().map(|(coupling, given)| (*coupling, given)).map_err(|e| *e)?;
+        let tables = [
+            (shares, share_count),
+            (terms, term_count),
+            (by_diffuse, by_diffuse_count),
+            (by_emission, by_emission_count),
+        ];
         // SAFETY: by the caller's promise.
-        let runner = unsafe { crate::run::Runner::new(run) }?;
-        let scene = &coupling.base.scene;
-        let (too_many, views, bands) = (blik_error::of(BLIK_ERROR_TOO_MANY), direction_count, scene.bands());
-        let facets = scene.facets() * bands;
-        let room = |each: usize| views.checked_mul(each).ok_or(too_many);
-        // SAFETY: by the caller's promise.
-        let (directions, to, mut tables) = unsafe {
-            let to = Signatures::new(signatures, signature_count, room(bands)?, signature_stride)?;
-            let tables = [
-                optional_output((shares, share_count), room(facets)?, BLIK_FIELD_SHARES)?,
-                optional_output((terms, term_count), room(TERMS * bands)?, BLIK_FIELD_COMPONENTS)?,
-                optional_output((by_diffuse, by_diffuse_count), room(facets)?, BLIK_FIELD_DIFFUSE)?,
-                optional_output(
-                    (by_emission, by_emission_count),
-                    room(facets * scene.sides())?,
-                    BLIK_FIELD_EMISSION,
-                )?,
-            ];
-            (input(directions, room(3)?)?, to, tables)
+        let (runner, mut out) = unsafe {
+            let signatures = (signatures, signature_count, signature_stride);
+            let out = ExplainOutputs::new(coupling, (directions, direction_count), signatures, tables)?;
+            (Runner::new(run)?, out)
         };
         let cells = wanted_cells(cells, coupling)?;
         let matrix = coupling.matrix()?;
         let all = coupled(coupling, &matrix);
-        let light = given.light(scene);
+        let light = given.light(&coupling.base.scene);
         let light = light.as_ref().map_err(|error| *error)?;
-        let chains = coupling.settings.asked.chains(coupling.rays);
         let wanted = all.explain_bytes(light)?;
         let work = |memory: &mut [u8]| {
             if memory.len() < wanted {
                 return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(wanted, memory.len()));
             }
-            all.start(memory)?;
-            let (mut number, views) = (0, (directions.as_chunks::<3>().0, cells));
-            let done = all.explain((given, light), None, views, chains, memory, |_, found| {
-                let forward = Vec3::from_array(views.0.get(number).copied().unwrap_or_default());
-                put_view((found, forward), (number, bands), &to, &mut tables);
-                number += 1;
-                if runner.told(number as f64 / views.0.len() as f64) { Ok(()) } else { Err(Error::Cancelled) }
-            });
-            done.map_err(|error| blik_error { index: number, ..error.into() })
+            explain_views(&all, coupling, (given, light), (&mut out, cells), &runner, memory)
         };
         // SAFETY: by the caller's promise.
         unsafe { with_scratch(scratch, scratch_size, wanted, work) }
     })
+}
+
+/// Explains all views in scratch memory that suffices.
+#[inline]
+fn explain_views(
+    all: &Lights<'_>,
+    coupling: &blik_coupling,
+    light: (&LightInput<'_>, &Light<'_>),
+    (out, cells): (&mut ExplainOutputs<'_>, usize),
+    runner: &Runner,
+    memory: &mut [u8],
+) -> Result<(), blik_error> {
+    all.start(memory)?;
+    let chains = coupling.settings.asked.chains(coupling.rays);
+    let (views, bands) = (out.views, coupling.base.scene.bands());
+    let mut number = 0;
+    let done = all.explain(light, None, (views, cells), chains, memory, |_, found| {
+        let forward = Vec3::from_array(views.get(number).copied().unwrap_or_default());
+        put_view((found, forward), (number, bands), out);
+        number += 1;
+        if runner.told(number as f64 / views.len() as f64) { Ok(()) } else { Err(Error::Cancelled) }
+    });
+    done.map_err(|error| blik_error { index: number, ..error.into() })
+}
+
+/// Where explained signatures go.
+struct ExplainOutputs<'a> {
+    views: &'a [[f64; 3]],
+    signatures: Signatures,
+    /// Shares, terms, derivatives by diffuse reflectance and by emission; empty: not wanted.
+    tables: [&'a mut [f64]; 4],
+}
+
+impl ExplainOutputs<'_> {
+    /// Checks the arrays of the caller, each with its number of entries.
+    ///
+    /// # Safety
+    /// They are null or as long as that.
+    // apart: what is wrong with them does not burden the stack of solving
+    #[inline(never)]
+    unsafe fn new<'a>(
+        coupling: &blik_coupling,
+        (directions, views): (*const f64, usize),
+        (signatures, count, stride): (*mut blik_signature, usize, usize),
+        [shares, terms, by_diffuse, by_emission]: [(*mut f64, usize); 4],
+    ) -> Result<ExplainOutputs<'a>, blik_error> {
+        let scene = &coupling.base.scene;
+        let (bands, facets) = (scene.bands(), scene.facets() * scene.bands());
+        let room = |each: usize| views.checked_mul(each).ok_or(blik_error::of(BLIK_ERROR_TOO_MANY));
+        // SAFETY: by the caller's promise.
+        unsafe {
+            let signatures = Signatures::new(signatures, count, room(bands)?, stride)?;
+            let tables = [
+                optional_output(shares, room(facets)?, BLIK_FIELD_SHARES)?,
+                optional_output(terms, room(TERMS * bands)?, BLIK_FIELD_COMPONENTS)?,
+                optional_output(by_diffuse, room(facets)?, BLIK_FIELD_DIFFUSE)?,
+                optional_output(by_emission, room(facets * scene.sides())?, BLIK_FIELD_EMISSION)?,
+            ];
+            Ok(ExplainOutputs { views: input(directions, room(3)?)?.as_chunks::<3>().0, signatures, tables })
+        }
+    }
 }
 
 /// Writes one view's signatures, and the tables of what they are made of and depend on.
@@ -160,15 +198,15 @@ pub unsafe extern "C" fn blik_explain(
 fn put_view(
     (found, forward): (&Explained<'_>, Vec3),
     (number, bands): (usize, usize),
-    to: &Signatures,
-    tables: &mut [&mut [f64]; 4],
+    out: &mut ExplainOutputs<'_>,
 ) {
     let mut background = [0.0; MAX_BANDS];
     let own = (found.solved, found.sums, &mut background[..]);
+    let to = &out.signatures;
     signatures_of(own, forward, |band, signature| to.put(number * bands + band, signature));
     let own = found.importance;
     let found = [&*own.shares, &*own.terms, &*own.diffuse, &*own.emission];
-    for (table, found) in tables.iter_mut().zip(found) {
+    for (table, found) in out.tables.iter_mut().zip(found) {
         let to = table.iter_mut().skip(number * found.len());
         to.zip(found).for_each(|(to, from)| *to = *from);
     }

@@ -43,7 +43,7 @@ impl LightArray {
         Ok(LightArray { start: all.as_ptr(), count, stride })
     }
 
-    /// What one of the lights is made from. An error tells its number as `index`; where it is about a facet's emission, as
+    /// Input of one of the lights. An error tells its number as `index`; where it is about a facet's emission, as
     /// `given`.
     ///
     /// # Safety

@@ -23,7 +23,7 @@ pub const BLIK_LIMIT_SOLVER: i32 = 3;
 /// Chains that were cut.
 pub const BLIK_LIMIT_CHAIN: i32 = 4;
 
-/// What comes back with an image.
+/// Report of an image: work that was done, error estimates and bounds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_report {

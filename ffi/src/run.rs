@@ -245,7 +245,7 @@ impl Job<'_> {
     }
 }
 
-/// What a caller's threads call.
+/// Entry point of a caller's threads.
 unsafe extern "C" fn lane(context: *mut c_void, index: usize) {
     // SAFETY: `Runner::each` passed its job, which lives until all tasks have returned.
     unsafe { &*context.cast::<Job<'_>>() }.lane(index);

@@ -22,7 +22,7 @@ pub struct blik_solution {
     tag: usize,
     pub(crate) coupling: &'static blik_coupling,
     pub(crate) light: Light<'static>,
-    /// What the light was made from.
+    /// Input of the light.
     pub(crate) input: LightInput<'static>,
     pub(crate) record: Solution<'static>,
     /// Bytes that stay in use.
@@ -121,7 +121,7 @@ unsafe fn given_sky<'a>(sky: *const blik_sky, bands: usize) -> Result<Option<Sky
     record.input(radiance, ground, samples).ok_or(choice).map(Some)
 }
 
-/// What the caller's light is made from: pointers and lengths are checked, values are not (`LightInput::light` does); its arrays
+/// Input of the caller's light: pointers and lengths are checked, values are not (`LightInput::light` does); its arrays
 /// are still the caller's.
 ///
 /// # Safety
@@ -164,6 +164,21 @@ pub(crate) unsafe fn given_light<'a>(
     // SAFETY: by the caller's promise.
     let emission = unsafe { input(light.emission, light.emission_count) }?;
     Ok(LightInput { sky, sun, emission, reference })
+}
+
+/// A coupling, and what a light for it is made from ([`given_light`]).
+///
+/// # Safety
+/// As for [`object`] and [`given_sky`].
+pub(crate) unsafe fn coupling_and_light<'a>(
+    coupling: *const blik_coupling,
+    light: *const blik_light,
+) -> Result<(&'a blik_coupling, LightInput<'a>), blik_error> {
+    // SAFETY: by the caller's promise.
+    unsafe {
+        let coupling: &blik_coupling = object(coupling)?;
+        Ok((coupling, given_light(light, &coupling.base.scene)?))
+    }
 }
 
 /// Counts of a solution's values and bytes.
@@ -306,10 +321,7 @@ pub unsafe extern "C" fn blik_solution_size(
     call(error, || {
         let to = needed(bytes)?;
         // SAFETY: by the caller's promise.
-        let (coupling, given) = unsafe {
-            let coupling: &blik_coupling = object(coupling)?;
-            (coupling, given_light(light, &coupling.base.scene)?)
-        };
+        let (coupling, given) = unsafe { coupling_and_light(coupling, light) }?;
         let size = Plan::new(coupling, &given)?.bytes(1)?;
         // SAFETY: not null.
         unsafe { to.write(size) };
@@ -341,12 +353,9 @@ pub unsafe extern "C" fn blik_solution_init(
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
-        let (coupling, given) = unsafe {
-            let coupling: &blik_coupling = object(coupling)?;
-            (coupling, &given_light(light, &coupling.base.scene))
-        };
+        let given = &unsafe { coupling_and_light(coupling, light) };
         // in one place of the stack: it is large
-        let given = given.as_ref().map_err(|error| *error)?;
+        let (coupling, given) = given.as_ref().map(|(coupling, given)| (*coupling, given)).map_err(|e| *e)?;
         // SAFETY: by the caller's promise.
         let (mut runner, memory) = unsafe { (Runner::new(run)?, bytes(memory, size)?) };
         let made = build(coupling, given, memory, &mut runner)?;
@@ -380,11 +389,8 @@ pub unsafe extern "C" fn blik_solution_create(
     call(error, || {
         let to = needed(solution)?;
         // SAFETY: by the caller's promise.
-        let (coupling, given, mut runner) = unsafe {
-            let coupling: &blik_coupling = object(coupling)?;
-            let given = given_light(light, &coupling.base.scene)?;
-            (coupling, given, Runner::new(run)?)
-        };
+        let ((coupling, given), mut runner) =
+            unsafe { (coupling_and_light(coupling, light)?, Runner::new(run)?) };
         let mut size = Plan::new(coupling, &given)?.bytes(runner.lanes())?;
         loop {
             let mut slab = Slab::new(size)?;

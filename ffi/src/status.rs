@@ -4,7 +4,7 @@ use blik_kernel::plane::scene::{BODY_ELEMENTS, BODY_RADIUS};
 use blik_kernel::{Error, Field};
 use core::ffi::{CStr, c_char};
 
-/// What a call returns: whether it was done, and if not, why.
+/// Status that a call returns: whether it was done, and if not, why.
 pub type blik_status = i32;
 
 /// Done.
@@ -146,7 +146,7 @@ pub(crate) fn status_text(number: i32) -> &'static CStr {
     }
 }
 
-/// What a refused call is about.
+/// Field that a refused call is about.
 pub type blik_field = i32;
 
 /// No field.
@@ -245,7 +245,7 @@ pub const BLIK_FIELD_BODY_RADIUS: i32 = 30;
 /// Coordinates of a body of the plane model: not finite, beyond 1e100, too few points, or two that coincide.
 pub const BLIK_FIELD_BODY_POINTS: i32 = 31;
 
-/// What a tally says of errors.
+/// Errors in a tally.
 pub const BLIK_FIELD_TALLY: i32 = 32;
 
 /// The mesh's vertices.
@@ -379,14 +379,14 @@ pub(crate) fn field_text(number: i32) -> &'static CStr {
     }
 }
 
-/// What is wrong with a refused call. Written where a call is refused and the pointer to it is not null; nothing has
+/// Error of a refused call. Written where a call is refused and the pointer to it is not null; nothing has
 /// to be set before. Frozen: it does not grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct blik_error {
     /// The status that the call returned.
     pub status: blik_status,
-    /// What it is about.
+    /// The field that it is about.
     pub field: blik_field,
     /// Index of the facet, vertex, normal, material, ray or direction that it is about; else 0.
     pub index: usize,

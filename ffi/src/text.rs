@@ -54,7 +54,7 @@ pub extern "C" fn blik_build_info() -> *const c_char {
     BUILD.as_ptr()
 }
 
-/// What a refused call tells, in one line without its end: status, field, value, index, sizes.
+/// Text of a refused call's error, in one line without its end: status, field, value, index, sizes.
 ///
 /// Returns the length of the whole text, as snprintf does: where it is not below `size`, the text was cut.
 ///

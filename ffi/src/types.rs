@@ -87,7 +87,7 @@ pub struct blik_mesh {
     pub two_sided: i32,
 }
 
-/// What decides the coupling besides the scene.
+/// Settings of a coupling.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_settings {
@@ -206,7 +206,7 @@ pub const BLIK_ORTHOGRAPHIC: i32 = 0;
 /// Rays through the eye.
 pub const BLIK_PERSPECTIVE: i32 = 1;
 
-/// What a pixel of a [`blik_camera`] shows.
+/// Sampling of a pixel of a [`blik_camera`].
 pub type blik_sampling = i32;
 
 /// Mean radiance over the pixel's square, background included.
@@ -228,7 +228,7 @@ pub struct blik_camera {
     pub eye: [f64; 3],
     /// The point in the image's middle.
     pub target: [f64; 3],
-    /// What is up in the image; default (0, 0, 1).
+    /// Direction that is up in the image; default (0, 0, 1).
     pub up: [f64; 3],
     /// Orthographic: height of the image in the mesh's unit.
     pub height: f64,

@@ -20,7 +20,7 @@ use blik_kernel::{facets, policy};
 use core::ffi::c_void;
 use core::ops::Range;
 
-/// What was done on rows of an image; tallies of all its rows add up by [`blik_tally_add`].
+/// Counts of the work on rows of an image; tallies of all its rows add up by [`blik_tally_add`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_tally {
@@ -503,7 +503,7 @@ pub unsafe extern "C" fn blik_radiance(
     })
 }
 
-/// What a distant observer measures in one direction and band. Arrays of it have a stride: it may grow.
+/// Signature in one direction and band, as a distant observer measures it. Arrays of it have a stride: it may grow.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct blik_signature {
@@ -533,11 +533,11 @@ pub(crate) fn wanted_cells(cells: usize, coupling: &blik_coupling) -> Result<usi
         let too_many = blik_error::of(BLIK_ERROR_TOO_MANY).field(BLIK_FIELD_CELLS);
         return Err(too_many.sizes(MOST_CELLS, cells));
     }
-    let tolerance = coupling.settings.asked.budget.solution;
-    Ok(if cells == 0 { policy::signature_cells(tolerance) } else { cells })
+    let budget = &coupling.settings.asked.budget;
+    Ok(if cells == 0 { policy::signature_cells(budget) } else { cells })
 }
 
-/// What distant observers measure of the whole object, without an image.
+/// Signatures of the whole object, as distant observers measure them, without an image.
 ///
 /// - `solution`: the solution
 /// - `directions`: three numbers a view, from the observer toward the object, of any length but zero
@@ -651,7 +651,7 @@ pub(crate) fn measure(
     Ok(())
 }
 
-/// What the sums of a view along `forward` say of each band; `background` has room for a value of each.
+/// Signatures of each band by the sums of a view along `forward`; `background` has room for a value of each.
 pub(crate) fn signatures_of(
     (solved, sums, background): (&Solved<'_>, &Sums, &mut [f64]),
     forward: Vec3,

@@ -3,6 +3,8 @@
 //!
 //! The stages stay apart: [`Host::geometry`] once per mesh, [`Host::light`] for each light, [`Host::image`] and
 //! [`Host::signature`] for each view. A new light traces no visibility rays, a new view solves nothing.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors and rounds).
 
 mod lights;
 mod report;
@@ -45,7 +47,7 @@ use std::sync::atomic::AtomicUsize;
 use std::time::Instant;
 use std::vec::Vec;
 
-/// What the caller asks for.
+/// Settings of the caller.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The wanted error of the image, eq. 16, relative to the reference radiance: 1e-6 to 0.1.
@@ -88,7 +90,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What the stages take.
+    /// The stages' settings.
     fn checked(&self) -> Result<settings::Settings, Error> {
         let Settings { max_bounces, all_irradiances, directional, ray_budget, .. } = *self;
         let tolerances = settings::Settings::new(self.tolerance, self.image_tolerance)?;
@@ -124,6 +126,28 @@ pub struct GeometryMemory {
 }
 
 /// Scene, tree, elements and coupling: everything that no light changes.
+///
+/// It borrows its memory:
+///
+/// ```no_run
+/// # use blik_kernel::{host::{Geometry, GeometryMemory, Host, Settings}, scene::SceneInput};
+/// # fn make(host: &Host, input: &SceneInput<'_>) {
+/// let mut memory = GeometryMemory::default();
+/// let geometry = host.geometry(&mut memory, input, &Settings::default()).unwrap();
+/// geometry.report();
+/// # }
+/// ```
+///
+/// ```compile_fail,E0597
+/// # use blik_kernel::{host::{Geometry, GeometryMemory, Host, Settings}, scene::SceneInput};
+/// # fn make(host: &Host, input: &SceneInput<'_>) {
+/// let geometry = {
+///     let mut memory = GeometryMemory::default();
+///     host.geometry(&mut memory, input, &Settings::default()).unwrap()
+/// };
+/// geometry.report();
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Geometry<'s> {
     scene: Scene<'s>,
@@ -141,6 +165,26 @@ pub struct Geometry<'s> {
 }
 
 /// A scene under one light, solved.
+///
+/// It borrows its geometry:
+///
+/// ```no_run
+/// # use blik_kernel::{host::{Geometry, Host, Lit}, light::LightInput};
+/// # fn make(host: &Host, geometry: Geometry<'_>, input: &LightInput<'_>) {
+/// let lit = host.light_of(&geometry, input).unwrap();
+/// lit.solved();
+/// drop(geometry);
+/// # }
+/// ```
+///
+/// ```compile_fail,E0505
+/// # use blik_kernel::{host::{Geometry, Host, Lit}, light::LightInput};
+/// # fn make(host: &Host, geometry: Geometry<'_>, input: &LightInput<'_>) {
+/// let lit = host.light_of(&geometry, input).unwrap();
+/// drop(geometry);
+/// lit.solved();
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Lit<'g> {
     geometry: &'g Geometry<'g>,
@@ -205,7 +249,7 @@ pub struct Image {
     pub pixels: Vec<f32>,
     /// The terms of eq. (11): diffuse, mirror-sky, mirror-diffuse; same shape.
     pub components: Option<[Vec<f32>; 3]>,
-    /// What was done and how good it is.
+    /// Report: work that was done, error estimates and bounds.
     pub report: Report,
 }
 
@@ -432,7 +476,7 @@ impl Host {
         Ok(tally)
     }
 
-    /// What a distant observer who looks along `forward` measures, and the rays that it took.
+    /// Signature that a distant observer who looks along `forward` measures, and the rays that it took.
     ///
     /// The background of the contrast is the sky in that direction.
     pub fn signature(&self, lit: &Lit<'_>, forward: Vec3) -> Result<(SignatureReport, u64), Error> {
@@ -487,7 +531,7 @@ impl Geometry<'_> {
         &self.elements
     }
 
-    /// What was done so far.
+    /// Report of the work so far.
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -527,10 +571,10 @@ impl Lit<'_> {
 
     /// The cells of a signature along `forward`.
     fn view(&self, solved: &Solved<'_>, forward: Vec3) -> Result<View, Error> {
-        View::new(solved, forward, settings::signature_cells(self.geometry.settings.budget.solution))
+        View::new(solved, forward, settings::signature_cells(&self.geometry.settings.budget))
     }
 
-    /// What the sums over all cells of a signature along `forward` say, and their rays.
+    /// Signature by the sums over all cells along `forward`, and their rays.
     fn signature(&self, forward: Vec3, sums: &Sums) -> (SignatureReport, u64) {
         (signature_report(&self.light, self.reference(), forward, sums), sums.rays)
     }
@@ -540,7 +584,7 @@ impl Lit<'_> {
         &self.tables.reference
     }
 
-    /// What was done so far.
+    /// Report of the work so far.
     pub fn report(&self) -> &Report {
         &self.report
     }
@@ -570,7 +614,7 @@ impl Lit<'_> {
     }
 }
 
-/// What the sums over all cells of a signature along `forward` say.
+/// Signature by the sums over all cells along `forward`.
 fn signature_report(light: &Light<'_>, reference: &[f64], forward: Vec3, sums: &Sums) -> SignatureReport {
     let bands = reference.len();
     let background = lights::background(light, forward, bands);

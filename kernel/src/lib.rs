@@ -109,7 +109,7 @@ pub mod light {
     pub use crate::scene::light::*;
 }
 
-/// What follows from the tolerance under one name, as callers of version 0.1 know it.
+/// Functions of the tolerance under one name, as callers of version 0.1 know it.
 pub mod policy {
     pub use crate::radiosity::limits::*;
     pub use crate::rounds::*;

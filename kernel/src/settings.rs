@@ -2,6 +2,8 @@
 //!
 //! Every layer over the kernel (the owning one, the C interface, bare metal) decides here, so that all compute the
 //! same bits.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors and seconds).
 
 use crate::base::budget::ErrorBudget;
 use crate::base::error::{Error, Field};
@@ -159,7 +161,7 @@ const FEWEST_BEAM_RAYS: f64 = 32768.0;
 /// Most rays of all beams together: more take minutes.
 const MOST_BEAM_RAYS: f64 = 1e8;
 
-/// Cells along each side of a signature's view: the outline's error, n^-3/2, half of the tolerance.
-pub fn signature_cells(tolerance: f64) -> usize {
-    (pow(0.5 * tolerance, -2.0 / 3.0) as usize).clamp(64, 2048)
+/// Cells along each side of a signature's view, n: the outline's error is n^-3/2.
+pub fn signature_cells(budget: &ErrorBudget) -> usize {
+    (pow(budget.outline, -2.0 / 3.0) as usize).clamp(64, 2048)
 }

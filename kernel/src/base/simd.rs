@@ -24,7 +24,7 @@ enum Level {
 }
 
 impl Isa {
-    /// What every processor of the target has.
+    /// Instructions that every processor of the target has.
     pub const BASELINE: Isa = Isa(Level::Baseline);
 
     /// The widest that this processor and operating system support.
@@ -74,7 +74,7 @@ const LANE_BITS: [u16; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
 
 /// A computation to be compiled for each instruction set; `run` must be `#[inline(always)]`.
 pub trait Task {
-    /// What it returns.
+    /// Its result.
     type Out;
     /// Does it.
     fn run(self) -> Self::Out;
@@ -140,7 +140,7 @@ pub trait Lanes: Copy {
 
 /// A computation in explicit lanes; `run` must be `#[inline(always)]`.
 pub trait LaneTask {
-    /// What it returns.
+    /// Its result.
     type Out;
     /// Does it.
     fn run<L: Lanes>(self, lanes: L) -> Self::Out;

@@ -1,4 +1,6 @@
 //! Sorting and selecting in place that cannot panic, whatever the order given: the core library's do where it is none.
+//!
+//! Constants of this file are measured by `cargo bench --bench counts` (instructions).
 
 use crate::base::index::{Index, IndexMut};
 use core::cmp::Ordering;

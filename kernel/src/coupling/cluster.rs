@@ -4,6 +4,9 @@
 //! One tree over all facets, split where positions or normals differ most, the heaviest node first; its leaves are the
 //! clusters. Facets that alone have a cluster's area stand alone, and may be quartered as those of coarse meshes are. The
 //! radiance of a cluster is its mean: what images show of one is found at the points that they show.
+//!
+//! Constants of this file are measured by `cargo test --test clusters -- --nocapture` (errors of images and irradiances)
+//! and `BLIK_BENCH_LARGE=1 cargo bench --bench stages -- facets` (seconds).
 
 use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
@@ -13,7 +16,7 @@ use crate::scene::Scene;
 
 /// Clusters of a scene, times the solution's tolerance: with 4,000 at 6e-3 the mean radiances of clusters leave 4e-4 of images
 /// of bodies and bowls, a fifth of what the image at 2e-3 may be wrong by.
-const CLUSTERS: f64 = 24.0;
+const CLUSTERS_PER_TOLERANCE: f64 = 24.0;
 
 /// Facets beyond which there are clusters. Up to it the planes of all facets are compared with each other, and closed forms
 /// stand for what nothing hides.
@@ -23,20 +26,20 @@ pub const CLUSTERED_FACETS: usize = 8192;
 pub(crate) const CLUSTERS_MADE: bool = cfg!(feature = "std");
 
 /// Facets over clusters from which on clusters are worth what they leave out.
-const WORTH: f64 = 1.5;
+const CLUSTERING_RATIO_LEAST: f64 = 1.5;
 
 /// Length that stands for a unit of the normal, in scene coordinates, in which the object fills [-1, 1]: less mixes both sides
 /// of a wing, more cuts bumps apart.
-const NORMAL_LENGTH: f64 = 0.3;
+const CLUSTER_NORMAL_LENGTH: f64 = 0.3;
 
 /// Weight of a node's area and facets beside that of how much its normals vary: even nodes show shadows, too.
-const EVEN: f64 = 0.1;
+const CLUSTER_EVENNESS_WEIGHT: f64 = 0.1;
 
 /// Levels to which the facets of a cluster are put in order: rays of rows start in 16 parts of it.
-const ORDERED: u32 = 4;
+const CLUSTER_ORDER_LEVELS: u32 = 4;
 
 /// Coordinates by which nodes are split: of positions and normals.
-const FEATURES: usize = 6;
+const CLUSTER_FEATURES: usize = 6;
 
 plain_struct! {
     /// A node of the tree that is a leaf so far.
@@ -63,8 +66,8 @@ pub struct Clusters<'m> {
 
 /// Number of clusters wanted of a scene of `facets` facets at a solution's tolerance; 0: its facets stay alone.
 pub fn wanted(facets: usize, tolerance: f64) -> usize {
-    let clusters = CLUSTERS / tolerance;
-    if CLUSTERS_MADE && facets > CLUSTERED_FACETS && facets as f64 > WORTH * clusters {
+    let clusters = CLUSTERS_PER_TOLERANCE / tolerance;
+    if CLUSTERS_MADE && facets > CLUSTERED_FACETS && facets as f64 > CLUSTERING_RATIO_LEAST * clusters {
         clusters as usize
     } else {
         0
@@ -142,18 +145,19 @@ struct Tree<'a, 'm> {
 }
 
 /// Coordinates of a facet, and its weight.
-fn features(scene: &Scene<'_>, facet: u32) -> ([f64; FEATURES], f64) {
+fn features(scene: &Scene<'_>, facet: u32) -> ([f64; CLUSTER_FEATURES], f64) {
     let facet = facet as usize;
     let [a, b, c] = scene.corners().at(facet);
-    let (middle, normal): (Vec3, Vec3) = ((a + b + c) / 3.0, scene.normals().at(facet) * NORMAL_LENGTH);
+    let (middle, normal): (Vec3, Vec3) =
+        ((a + b + c) / 3.0, scene.normals().at(facet) * CLUSTER_NORMAL_LENGTH);
     ([middle.x, middle.y, middle.z, normal.x, normal.y, normal.z], scene.areas().at(facet))
 }
 
 /// Weighted mean and variance of each coordinate, and the sum of weights, of facets.
-fn moments(scene: &Scene<'_>, facets: &[u32]) -> ([f64; FEATURES], [f64; FEATURES], f64) {
-    let (mut sums, mut squares, mut weight) = ([0.0; FEATURES], [0.0; FEATURES], 0.0);
+fn moments(scene: &Scene<'_>, facets: &[u32]) -> ([f64; CLUSTER_FEATURES], [f64; CLUSTER_FEATURES], f64) {
+    let (mut sums, mut squares, mut weight) = ([0.0; CLUSTER_FEATURES], [0.0; CLUSTER_FEATURES], 0.0);
     // about the first facet: squares of far coordinates would cancel
-    let origin = facets.first().map_or([0.0; FEATURES], |first| features(scene, *first).0);
+    let origin = facets.first().map_or([0.0; CLUSTER_FEATURES], |first| features(scene, *first).0);
     for &facet in facets {
         let (x, w) = features(scene, facet);
         weight += w;
@@ -189,9 +193,9 @@ fn partition(scene: &Scene<'_>, facets: &mut [u32], feature: usize, place: f64) 
 }
 
 /// The coordinate of most variance.
-fn widest(variances: &[f64; FEATURES]) -> usize {
+fn widest(variances: &[f64; CLUSTER_FEATURES]) -> usize {
     let wider = |best: usize, at: usize| if variances.at(at) > variances.at(best) { at } else { best };
-    (1..FEATURES).fold(0, wider)
+    (1..CLUSTER_FEATURES).fold(0, wider)
 }
 
 impl Tree<'_, '_> {
@@ -231,7 +235,7 @@ impl Tree<'_, '_> {
         crate::base::sort::sort(self.leaves.head_mut(self.used), &|a: &Leaf, b: &Leaf| a.start.cmp(&b.start));
         for at in 0..self.used {
             let leaf = self.leaves.at(at);
-            self.put_in_order(leaf.start as usize, leaf.end as usize, ORDERED);
+            self.put_in_order(leaf.start as usize, leaf.end as usize, CLUSTER_ORDER_LEVELS);
         }
         Some(())
     }
@@ -255,9 +259,10 @@ impl Tree<'_, '_> {
         let (means, variances, area) = moments(self.scene, facets);
         let feature = widest(&variances);
         let [.., x, y, z] = variances;
-        let normals = (x + y + z) / (NORMAL_LENGTH * NORMAL_LENGTH);
+        let normals = (x + y + z) / (CLUSTER_NORMAL_LENGTH * CLUSTER_NORMAL_LENGTH);
         let weight = area / self.area + f64::from(end - start) / self.all.max(1) as f64;
-        let worth = if end - start > 1 && area > 0.0 { weight * (EVEN + normals) } else { -1.0 };
+        let worth =
+            if end - start > 1 && area > 0.0 { weight * (CLUSTER_EVENNESS_WEIGHT + normals) } else { -1.0 };
         self.put(Leaf { worth, place: means.at(feature), start, end, feature: feature as u64 })
     }
 

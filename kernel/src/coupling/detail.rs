@@ -2,6 +2,8 @@
 //!
 //! What arrives at a triangle changes beside them within a small part of it. Points or rays that are spread over all of
 //! the triangle are few there, and can miss them.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors beside fine detail).
 
 use crate::base::math::{Vec3, sqrt, unit};
 use crate::rays::bvh::{Bvh, HalfSpace};

@@ -120,11 +120,10 @@ impl<'m> Elements<'m> {
         }
         let child = |node: usize| trees.get(node).map(|n| n.child as usize).filter(|c| *c != 0);
         let clusters = tree.clusters();
-        let groups = Groups::new(scene, clusters, &mut arena)?;
+        let groups = Groups::new(scene, clusters, facet_of, &mut arena)?;
         let mut at = clusters.count();
         for (element, facets) in clusters.iter().enumerate() {
             facets.iter().for_each(|facet| nodes.set(*facet as usize, ELEMENT_NODE | element as u32));
-            facet_of.set(element, largest(scene, facets));
         }
         let alone = |facet: &usize| trees.get(*facet).is_some_and(|node| node.cluster == 0);
         walk((0..facets).filter(alone), child, |facet, node, path| {
@@ -327,7 +326,13 @@ fn largest(scene: &Scene<'_>, facets: &[u32]) -> u32 {
 }
 
 impl<'m> Groups<'m> {
-    fn new(scene: &Scene<'_>, clusters: Clusters<'_>, arena: &mut Arena<'m>) -> Result<Groups<'m>, Error> {
+    /// The facets of all clusters; the largest of each is written to `facet_of`.
+    fn new(
+        scene: &Scene<'_>,
+        clusters: Clusters<'_>,
+        facet_of: &mut [u32],
+        arena: &mut Arena<'m>,
+    ) -> Result<Groups<'m>, Error> {
         let (count, facets) = (clusters.count(), clusters.facets());
         let starts = arena.take::<u32>(count + 1)?;
         let members = arena.take::<u32>(facets)?;
@@ -345,7 +350,9 @@ impl<'m> Groups<'m> {
                 at += 1;
             }
             starts.set(cluster + 1, at as u32);
-            let one = scene.areas().at(largest(scene, facets) as usize);
+            let largest = largest(scene, facets);
+            facet_of.set(cluster, largest);
+            let one = scene.areas().at(largest as usize);
             shares.set(cluster, if one > 0.0 { all / one } else { 1.0 });
         }
         Ok(Groups { starts, members, sums, shares })

@@ -4,6 +4,9 @@
 //! Its mean over each of the element's quarters takes Gauss points as dense as the distance asks for. The quarters give
 //! mean, gradients and departure from them as rays' hits would. The quadrature's error is a small part of that which
 //! the row's rays would have.
+//!
+//! Constants of this file are measured by `cargo test --test contact` (errors beside contacts) and `cargo bench --bench
+//! counts` (instructions).
 
 use super::mirror_path::STRAIGHT;
 use super::row_builder::RowBuilder;
@@ -91,7 +94,7 @@ struct Target {
 }
 
 impl Target {
-    /// What all elements of a side of a facet have in common.
+    /// Common quantities of all elements of a side of a facet.
     fn side(scene: &Scene<'_>, facet: usize, side: usize) -> Target {
         let material = scene.material(facet);
         let glows = scene.glows(material);
@@ -160,7 +163,7 @@ impl Known {
         }
     }
 
-    /// What the whole element sees.
+    /// Sum over the whole element.
     pub fn share(&self) -> f64 {
         0.25 * self.shares.iter().sum::<f64>()
     }
@@ -175,7 +178,7 @@ impl Known {
     }
 }
 
-/// What entries block of the sky, in whatever direction.
+/// Share of the sky that entries block, in whatever direction.
 #[derive(Default)]
 struct Blocked {
     weight: f64,
@@ -267,7 +270,7 @@ impl Entries<'_, '_> {
         Some(())
     }
 
-    /// What each of the receiver's quarters sees of these elements, by a rule.
+    /// Form factors of the receiver's quarters to these elements, by a rule.
     #[inline(never)]
     fn means(&self, place: &Place<'_>, class: usize, unknowns: &[u32]) -> [[f64; TRIANGLE_LANES]; QUARTERS] {
         let rule: &[(f64, f64, f64)] = match class {
@@ -334,7 +337,7 @@ impl Entries<'_, '_> {
         gradient
     }
 
-    /// What all entries block of the sky.
+    /// Share of the sky that all entries block.
     fn block(&mut self, blocked: &Blocked) -> Option<()> {
         let gradient = blocked.gradient.map(|g| g as f32);
         let record = Record::escape(None, BLOCKED, blocked.weight, gradient);

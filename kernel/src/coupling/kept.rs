@@ -4,6 +4,8 @@
 //! are, and new mirror reflectances the products of their paths alone. A row is computed anew where its rays may have met
 //! what sent or mirrored nothing and does now, where facets that were one mirror class are so no longer, where mirrors
 //! reflect more and chains had been cut, and where nothing needed the row before.
+//!
+//! Constants of this file are measured by `cargo test --test update` (rows that are kept and their bits).
 
 use super::mirror_path::STRAIGHT;
 use super::{ABSENT, BLOCKED, Coupling, OPEN, RowView};
@@ -249,7 +251,7 @@ pub struct Kept<'a> {
     pub coupling: &'a Coupling<'a>,
     /// How the scene differs from theirs.
     pub change: &'a Change<'a>,
-    /// What becomes of each row.
+    /// State of each row after the change.
     pub fates: &'a [u8],
 }
 
@@ -272,7 +274,7 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// What became of the rows of a coupling.
+/// Counts of a coupling's rows that were kept, rescaled and redone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fates {
     /// Rows kept as they are.

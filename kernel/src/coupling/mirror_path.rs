@@ -5,6 +5,8 @@
 //! geometric weight and the number of a path; the path's entry in the table keeps the product. The entries form a tree
 //! in which each way from the root names the classes in ascending order. A product is therefore always multiplied in
 //! the same order, and its bits do not depend on the order in which paths were found.
+//!
+//! Constants of this file are measured by `cargo test --test closure` (light by way of up to a thousand mirrors).
 
 use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};

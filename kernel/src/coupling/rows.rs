@@ -13,6 +13,9 @@
 //! A part whose rays meet hardly anything but black backs is inside a body, where nothing sees it: the others stand for
 //! what is seen. Where some of a row's rays meet backs, each ray that meets anything tells whether it starts inside a
 //! body, and counts or not.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors) and `cargo bench --bench
+//! counts` (instructions).
 
 use super::exact::{self, Entries, Known, MIRROR_KINDS, mirror_kind};
 use super::kept::Kept;
@@ -37,7 +40,7 @@ use crate::scene::Scene;
 use core::f64::consts::SQRT_2;
 use core::ops::Range;
 
-/// What rows follow from the tolerance.
+/// Settings of rows, by the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowSettings {
     /// Rays of a row of a facet of mean area whose hemisphere is half filled; a power of two.
@@ -76,7 +79,7 @@ fn slopes(open: [bool; ELEMENT_PARTS]) -> [[f64; 2]; ELEMENT_PARTS] {
     [0, 1, 2, 3].map(|part| if part < 3 && open[part] { [of(part, 0), of(part, 1)] } else { [0.0; 2] })
 }
 
-/// By what each exposed part counts in how far light departs from the linear function: the middle one beside the
+/// Weight of each exposed part in how far light departs from the linear function: the middle one beside the
 /// corners' mean; where some are not exposed, half the difference between two; none where one is all.
 fn departures(open: [bool; ELEMENT_PARTS]) -> [f64; ELEMENT_PARTS] {
     if open == [true; ELEMENT_PARTS] {
@@ -92,7 +95,7 @@ fn departures(open: [bool; ELEMENT_PARTS]) -> [f64; ELEMENT_PARTS] {
     })
 }
 
-/// By what each part of a cluster counts in how far light departs from its mean: half the difference between two pairs, whose
+/// Weight of each part of a cluster in how far light departs from its mean: half the difference between two pairs, whose
 /// square is expected to be that of one.
 const CLUSTER_DEPARTURES: [f64; ELEMENT_PARTS] = [0.5, -0.5, 0.5, -0.5];
 
@@ -282,7 +285,7 @@ impl RowRays {
     }
 }
 
-/// What the rays of a row have found so far.
+/// Counts of a row's rays so far.
 #[derive(Default)]
 struct Tally {
     rays: u32,
@@ -292,7 +295,7 @@ struct Tally {
     clear: [u32; ELEMENT_PARTS],
     mirrored: [[u32; MIRROR_KINDS]; ELEMENT_PARTS],
     truncated_weight: f64,
-    /// What is entered in closed form.
+    /// Entries in closed form.
     known: Known,
     /// Rays of each part's parts, and how many of them met a black back first.
     bins: [u32; ROW_BINS],
@@ -300,6 +303,63 @@ struct Tally {
     /// Whether rays of a part's part are told apart by where they start, and how many started inside a body.
     apart: [bool; ROW_BINS],
     inside: [u32; ROW_BINS],
+}
+
+/// Conversion of the records of a row's rays into its entries.
+struct RowEnding {
+    /// Scale of the entries in closed form.
+    known_scale: f64,
+    /// [`Tally::kinds`] of each part.
+    kinds: [[f64; 1 + MIRROR_KINDS]; ELEMENT_PARTS],
+    /// Rays of each part's parts, and of each part, that count.
+    exposed: [u32; ROW_BINS],
+    counts: [u32; ELEMENT_PARTS],
+    /// Whether all rays count.
+    all_exposed: bool,
+    /// Weight of a ray.
+    mean: f64,
+    /// Rays of each part's part of the first half.
+    first_half: f32,
+    /// Mirror path of the escapes that are not kept.
+    dropped: u16,
+    /// [`slopes`] and [`departures`] of the parts.
+    slopes: [[f64; 2]; ELEMENT_PARTS],
+    departures: [f64; ELEMENT_PARTS],
+}
+
+impl RowEnding {
+    /// The entry of one record; `None` where it does not count.
+    #[inline]
+    fn finish(&self, mut record: Record) -> Option<Record> {
+        if let Some(record) = exact::finished(&record, self.known_scale) {
+            return Some(record);
+        }
+        let (kind, bin) = (record.gradient[0] as usize / ROW_BINS, record.gradient[0] as usize % ROW_BINS);
+        let part = bin / ELEMENT_PARTS;
+        let scale = self.kinds.get(part).map_or(1.0, |kinds| kinds.at(kind));
+        record.weight *= scale;
+        record.moment = record.moment.map(|m| m * scale as f32);
+        if self.exposed[bin] == 0 || (record.is_escape() && record.path() == self.dropped) {
+            return None;
+        }
+        let own = record.weight / f64::from(self.counts[part]);
+        let gradient =
+            if self.all_exposed { self.slopes[part].map(|slope| (slope * own) as f32) } else { [0.0; 2] };
+        let first = record.gradient[1] < self.first_half;
+        let difference = if first { self.mean * record.weight } else { -self.mean * record.weight };
+        let departure = 2.0 * self.departures[part] * own;
+        let split =
+            |value: f64, to_first: bool| if to_first { [value as f32, 0.0] } else { [0.0, value as f32] };
+        let ([a, b], [c, d]) = (split(difference, part < 2), split(departure, first));
+        let moment = record.moment.map(|m| self.mean as f32 * m);
+        Some(Record {
+            weight: self.mean * record.weight,
+            gradient,
+            half_differences: [a, b, c, d],
+            moment,
+            ..record
+        })
+    }
 }
 
 impl Tally {
@@ -449,6 +509,18 @@ impl Tracer<'_, '_> {
             self.builder.drop_row();
             return Some(false);
         }
+        self.enter(&receiver, &clear, most, tally)
+    }
+
+    /// Enters what nothing hides from a receiver in closed form; false, and no row, where that is not sound.
+    #[inline]
+    fn enter(
+        &mut self,
+        receiver: &Receiver,
+        clear: &ProvenVisible<'_>,
+        most: u32,
+        tally: &mut Tally,
+    ) -> Option<bool> {
         let all = [true; ELEMENT_PARTS];
         let entries = Entries {
             scene: self.scene,
@@ -459,7 +531,7 @@ impl Tracer<'_, '_> {
             slopes: slopes(all),
             departures: departures(all),
         };
-        entries.add(&receiver, self.plane_sides, &clear, &mut tally.known)?;
+        entries.add(receiver, self.plane_sides, clear, &mut tally.known)?;
         let sound = tally.known.share() > 0.0 && tally.known.share() <= 1.0 + HEMISPHERE_EXCESS_MOST;
         if !sound {
             self.builder.drop_row();
@@ -556,41 +628,19 @@ impl Tracer<'_, '_> {
         } else {
             (slopes(open), departures(open))
         };
-        let first_half = (tally.rays / (2 * ELEMENT_PARTS as u32)) as f32;
-        let mean = 1.0 / f64::from(seen.max(1));
-        let kinds = [0, 1, 2, 3].map(|part| tally.kinds(part));
-        let exposed_all = seen == tally.rays;
-        let finish = |mut record: Record| {
-            if let Some(record) = exact::finished(&record, tally.known.scale) {
-                return Some(record);
-            }
-            let (kind, bin) =
-                (record.gradient[0] as usize / ROW_BINS, record.gradient[0] as usize % ROW_BINS);
-            let scale = kinds.get(bin / ELEMENT_PARTS).map_or(1.0, |kinds| kinds.at(kind));
-            record.weight *= scale;
-            record.moment = record.moment.map(|m| m * scale as f32);
-            if exposed[bin] == 0 || (record.is_escape() && record.path() == dropped) {
-                return None;
-            }
-            let own = record.weight / f64::from(counts[bin / ELEMENT_PARTS]);
-            let part = bin / ELEMENT_PARTS;
-            let gradient =
-                if exposed_all { slopes[part].map(|slope| (slope * own) as f32) } else { [0.0; 2] };
-            let first = record.gradient[1] < first_half;
-            let difference = if first { mean * record.weight } else { -mean * record.weight };
-            let departure = 2.0 * departures[part] * own;
-            let split =
-                |value: f64, to_first: bool| if to_first { [value as f32, 0.0] } else { [0.0, value as f32] };
-            let ([a, b], [c, d]) = (split(difference, part < 2), split(departure, first));
-            let moment = record.moment.map(|m| mean as f32 * m);
-            Some(Record {
-                weight: mean * record.weight,
-                gradient,
-                half_differences: [a, b, c, d],
-                moment,
-                ..record
-            })
+        let ending = RowEnding {
+            known_scale: tally.known.scale,
+            kinds: [0, 1, 2, 3].map(|part| tally.kinds(part)),
+            exposed,
+            counts,
+            all_exposed: seen == tally.rays,
+            mean: 1.0 / f64::from(seen.max(1)),
+            first_half: (tally.rays / (2 * ELEMENT_PARTS as u32)) as f32,
+            dropped,
+            slopes,
+            departures,
         };
+        let finish = |record: Record| ending.finish(record);
         self.builder.end_row(stats, finish, Record::join);
     }
 

@@ -5,6 +5,9 @@
 //! [`SubdivisionTree::newest_level`] gives the newest triangles, [`Level::probe`] (on any range of them) measures their
 //! unevenness, [`SubdivisionTree::refine`] quarters those whose error counts most. Triangles far larger than objects
 //! close before them are quartered first: their probed points are too far from each other to show such objects.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors and elements) and `cargo bench
+//! --bench stages` (seconds).
 
 use crate::base::arena::{Arena, plain_struct};
 use crate::base::budget::ErrorBudget;
@@ -350,7 +353,7 @@ impl Level<'_> {
                 continue;
             }
             let share = Path(node.path).share() * scene.areas().at(facet) / self.area;
-            probe.negligible = 0.25 * budget.elements / (rho * rho) * (1.0 / (many * share)).max(1.0);
+            probe.negligible = budget.probes / (rho * rho) * (1.0 / (many * share)).max(1.0);
             for side in 0..scene.sides() {
                 if node.path == 0 && opens_to_sky(scene, bvh, facet, scene.side_normal(facet, side)) {
                     continue;

@@ -1,5 +1,8 @@
 //! The double contour form, A F = (1/2 pi) int int ln r dx . dy: the integral along one edge in closed form,
 //! along the other by Gauss points, graded toward the places where the closed form is singular or nearly so.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor` (errors) and `cargo bench --bench counts`
+//! (instructions).
 
 use super::angle::wide_angle;
 use super::convex::{CAPACITY, Convex, edges};
@@ -37,7 +40,7 @@ struct Singular {
     h: f64,
 }
 
-/// What the integrand along one outer edge needs.
+/// Constants of the integrand along one outer edge.
 struct Integrand {
     isa: Isa,
     start: Vec3,

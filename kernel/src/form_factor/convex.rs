@@ -1,4 +1,6 @@
 //! Convex polygons of a fixed capacity, and clipping them.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor` (errors).
 
 use crate::base::math::Vec3;
 

@@ -1,4 +1,6 @@
 //! From a point to a polygon: Lambert's contour sum.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor` (errors).
 
 use super::angle::angle;
 use super::convex::{double_area, edges};

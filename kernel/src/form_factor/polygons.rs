@@ -1,4 +1,7 @@
 //! Exchange areas of many pairs of polygons, eight pairs at a time.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor_pairs` (errors) and `cargo bench --bench counts`
+//! (instructions).
 
 use super::convex::double_area;
 use super::cubature::CUBATURE_RULES;
@@ -35,7 +38,7 @@ pub struct Polygons<'m, P> {
     starts: &'m [u32],
     /// By patch: its polygon.
     owners: &'m [u32],
-    /// What lengths of the patches are in units of; 0 where they are unfit for any rule.
+    /// Unit of the patches' lengths; 0 where they are unfit for any rule.
     scale: f64,
     isa: Isa,
 }
@@ -311,7 +314,7 @@ impl<'p, 'm, P: AsRef<[Vec3]>> Row<'p, 'm, P> {
         }
     }
 
-    /// What the classes of a block's `lanes` ask for.
+    /// Rules that the classes of a block's `lanes` ask for.
     fn block(
         &mut self,
         block: usize,

@@ -1,4 +1,7 @@
 //! The area form of the exchange area, of eight pairs of patches side by side.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor_pairs` (errors) and `cargo bench --bench counts`
+//! (instructions).
 
 use super::cubature::{CUBATURE_POINTS_MOST, CUBATURE_RULES, Points, SQUARE, TRIANGLE};
 use super::pair::PAIR_PLANE_ROUNDING;
@@ -26,14 +29,14 @@ plain_table! {
         pub centre: [Eight; 3],
         /// Of the sphere about the centre that holds the patch.
         pub radius: Eight,
-        /// What distances are compared with to choose a rule.
+        /// Length that distances are compared with to choose a rule.
         pub size: Eight,
         /// A [`Shape`]'s number.
         pub shape: Eight,
     }
 }
 
-/// What rules take a patch for.
+/// Shape as which rules take a patch.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     Triangle,
@@ -339,7 +342,7 @@ pub(super) const BEHIND: u8 = 254;
 /// In place of the number of a pair's rules: no rule is exact enough.
 pub(super) const EXACT: u8 = 255;
 
-/// What is to be done with the pairs of one patch, spread over all lanes, and eight others, by lane: [`BEHIND`],
+/// Rules of the pairs of one patch, spread over all lanes, and eight others, by lane: [`BEHIND`],
 /// [`EXACT`], or the number of the rule for the own patch times [`CUBATURE_RULES`] and that for the other's.
 pub(super) struct Classes<'a> {
     pub own: &'a Block,

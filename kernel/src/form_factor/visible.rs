@@ -1,4 +1,6 @@
 //! Form factors with opaque triangles in the path.
+//!
+//! Constants of this file are measured by `cargo test --test form_factor_visible` (errors against ray counts).
 
 use super::convex::{CAPACITY, Convex, double_area, edges, pieces};
 use super::pair::{fronts, polygon_to_polygon};
@@ -31,7 +33,7 @@ const RECEIVER_HALVINGS_MOST: u32 = 26;
 pub struct Estimate {
     /// The value.
     pub value: f64,
-    /// What its error is expected to stay below, absolute. Not a bound: a shadow too small for all points of
+    /// Expected bound on its absolute error. Not a bound: a shadow too small for all points of
     /// the quadrature goes unseen.
     pub error: f64,
 }
@@ -402,7 +404,7 @@ struct Halving {
     difference: f64,
     /// The upper half by one rule.
     high: f64,
-    /// What the lower half came to, once it has.
+    /// Result of the lower half, once there is one.
     low_value: f64,
     low_error: f64,
 }

@@ -78,7 +78,7 @@ impl Host {
     }
 }
 
-/// What a signature is made of and depends on.
+/// A signature with its parts and derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
     /// The signature.
@@ -121,7 +121,7 @@ impl Host {
         let all = Lights { scene, bvh, elements, coupling: &coupling, settings };
         let light = input.light(scene)?;
         let mut bytes = all.explain_bytes(&light)?;
-        let cells = settings::signature_cells(settings.budget.solution);
+        let cells = settings::signature_cells(&settings.budget);
         loop {
             let mut memory = Memory::new(bytes);
             all.start(memory.bytes_mut())?;
@@ -185,7 +185,7 @@ impl Lights<'_> {
                     let (scene, bvh, elements) = (self.scene, self.bvh, self.elements);
                     let settings = self.settings.chains(geometry.rays);
                     let solved = Solved { scene, bvh, elements, light: &light, solution, settings };
-                    let cells = settings::signature_cells(self.settings.budget.solution);
+                    let cells = settings::signature_cells(&self.settings.budget);
                     return report(&solved, self.coupling, wanted, cells, lane.view.bytes_mut());
                 }
                 Err(Error::BufferTooSmall { needed: more, .. }) if more < MOST_BEAM_BYTES => needed = more,

@@ -196,18 +196,16 @@ impl Report {
     fn shares(&self, budget: &ErrorBudget, tally: &Tally) -> Vec<BudgetShare> {
         let [visibility, sampling, solver, tail] =
             estimate::parts(tally, self.certified.solver).map(|(_, error)| Some(error));
-        let share = |name, allowed, spent| BudgetShare { name, allowed, spent };
-        std::vec![
-            share("image", budget.image, Some(self.error_estimate)),
-            share("solution", budget.solution, visibility),
-            share("pixels", budget.pixels, sampling),
-            share("solver", budget.solver, solver),
-            share("chains", budget.chains, tail),
-            share("row_chains", budget.row_chains, Some(self.certified.dropped)),
-            share("sky", budget.sky, None),
-            share("beam_chains", budget.beam_chains, None),
-            share("lobes", budget.lobes, None),
-        ]
+        let spent = |name| match name {
+            "image" => Some(self.error_estimate),
+            "solution" => visibility,
+            "pixels" => sampling,
+            "solver" => solver,
+            "chains" => tail,
+            "row_chains" => Some(self.certified.dropped),
+            _ => None,
+        };
+        budget.shares().map(|(name, allowed)| BudgetShare { name, allowed, spent: spent(name) }).to_vec()
     }
 
     /// Adds the part of an image of `pixels` pixels and draws the conclusions.

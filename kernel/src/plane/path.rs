@@ -1,4 +1,6 @@
 //! Paths by way of mirrors and lobes: their state, what they meet, and how far they go.
+//!
+//! Constants of this file are measured by `cargo bench --bench plane` (errors and seconds).
 
 use crate::plane::Vec2;
 use crate::plane::lobe::PlaneLobe;

@@ -6,6 +6,9 @@
 //! weights times the targets' areas add up to the flux that leaves. A record also tells where the sun seems to stand
 //! ([`crate::radiosity::sun_image`]), so that images need not take these means. Error of an element that receives n of
 //! the rays: about n^-3/4 of its value.
+//!
+//! Constants of this file are measured by `cargo test --test thrown_sun` (errors of reflected sunlight) and `cargo bench
+//! --bench counts` (instructions).
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
@@ -26,7 +29,7 @@ use crate::scene::sun::Sun;
 use crate::scene::{NO_MIRROR, Scene};
 use core::ops::Range;
 
-/// What beams follow from the tolerance.
+/// Settings of beams, by the tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BeamSettings {
     /// Rays per unit of mirror area (scene coordinates) seen from the sun.
@@ -145,7 +148,7 @@ impl Tracer<'_, '_> {
         Some(())
     }
 
-    /// What may stand in the way of the sun's light toward a mirror's side and, where it is flat and ideal, of the light that
+    /// Facets that may stand in the way of the sun's light toward a mirror's side and, where it is flat and ideal, of the light that
     /// it throws: the same hits by fewer looks.
     fn ahead(&self, facet: usize, side: usize) -> [Ahead; 2] {
         let (scene, bvh) = (self.scene, self.bvh);
@@ -176,24 +179,7 @@ impl Tracer<'_, '_> {
         let (scene, bvh) = (self.scene, self.bvh);
         let mut rays = [Ray::new(Vec3::ZERO, Vec3::Z); BEAM_RAYS_TOGETHER];
         let mut chains: [Option<Chain>; BEAM_RAYS_TOGETHER] = [None; BEAM_RAYS_TOGETHER];
-        let mut count = 0;
-        for index in numbers {
-            let (p, q) = sequence.pair(index, 0);
-            let (u, v) = triangle(p, q);
-            let surface = Surface::new(scene, facet, side, u, v);
-            let (s, t) = sequence.pair(index, 2);
-            let toward = self.sun.sample(s, t);
-            if toward.dot(surface.normal) > 0.0 {
-                // flux per unit of normal irradiance, the first cosine still to come
-                let (flux, path, arrival) = (scene.areas().at(facet), STRAIGHT, None);
-                let axis = Some(-self.sun.direction());
-                let chain =
-                    Chain { index, surface, mirror: facet, direction: -toward, flux, path, arrival, axis };
-                rays.set(count, surface.spawn_ray(toward));
-                chains.set(count, Some(chain));
-                count += 1;
-            }
-        }
+        let mut count = self.start_chains((facet, side), sequence, numbers, (&mut rays, &mut chains));
         let mut hidden = [false; BEAM_RAYS_TOGETHER];
         match sunward.facets() {
             Some([]) => {}
@@ -238,6 +224,37 @@ impl Tracer<'_, '_> {
             count = left;
         }
         Some(())
+    }
+
+    /// Starts the chains of rays that leave a mirror toward the sun, and tells how many do.
+    #[inline]
+    fn start_chains(
+        &self,
+        (facet, side): (usize, usize),
+        sequence: &Sequence,
+        numbers: Range<u32>,
+        (rays, chains): (&mut [Ray; BEAM_RAYS_TOGETHER], &mut [Option<Chain>; BEAM_RAYS_TOGETHER]),
+    ) -> usize {
+        let scene = self.scene;
+        let mut count = 0;
+        for index in numbers {
+            let (p, q) = sequence.pair(index, 0);
+            let (u, v) = triangle(p, q);
+            let surface = Surface::new(scene, facet, side, u, v);
+            let (s, t) = sequence.pair(index, 2);
+            let toward = self.sun.sample(s, t);
+            if toward.dot(surface.normal) > 0.0 {
+                // flux per unit of normal irradiance, the first cosine still to come
+                let (flux, path, arrival) = (scene.areas().at(facet), STRAIGHT, None);
+                let axis = Some(-self.sun.direction());
+                let chain =
+                    Chain { index, surface, mirror: facet, direction: -toward, flux, path, arrival, axis };
+                rays.set(count, surface.spawn_ray(toward));
+                chains.set(count, Some(chain));
+                count += 1;
+            }
+        }
+        count
     }
 
     /// The ray by which a chain goes on from its mirror, if there is one and it matters.
@@ -294,7 +311,7 @@ impl Ahead {
     const NOTHING: Ahead = Ahead { facets: [0; AHEAD_FACETS], count: 0 };
     const UNKNOWN: Ahead = Ahead { count: usize::MAX, ..Ahead::NOTHING };
 
-    /// What reaches into a region, the facet `own` apart.
+    /// Facets that reach into a region, the facet `own` apart.
     #[inline(never)]
     fn within(bvh: &Bvh<'_>, halves: &[HalfSpace; 4], own: u32) -> Ahead {
         let mut ahead = Ahead::NOTHING;

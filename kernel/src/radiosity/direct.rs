@@ -3,6 +3,9 @@
 //!
 //! Nothing here traces sky rays: the coupling kept which part of each hemisphere is blocked and where mirror
 //! chains escape. The sun needs rays: shadows, and beams that flat and glossy mirrors reflect.
+//!
+//! Constants of this file are measured by `cargo test --test sun` (shares in shadow) and `cargo bench --bench counts`
+//! (instructions).
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
@@ -230,7 +233,7 @@ pub fn sun_rows(
     Ok(rays)
 }
 
-/// What an element sees of the sun.
+/// Share of the sun that an element sees.
 struct Lit {
     /// Share of the sun's light that nothing hides, the mean over its points.
     share: f64,

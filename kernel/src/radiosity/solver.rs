@@ -10,7 +10,10 @@
 //! q |x' - x| |(I - G)^-1|, in the largest norm. Where all rows of G sum to q < 1, the inverse is at most 1/(1 - q).
 //! Where some rows sum to 1, as in a white room with a window, any v >= 0 with (I - G) v >= 1 - d > 0 bounds it by
 //! max v/(1 - d); such a v is found by the same iteration with the source 1 ([`Solver::for_inverse_bound`]).
+//!
+//! Constants of this file are measured by `cargo test -p blik-kernel --lib solver` (sweeps and bounds).
 
+use crate::base::budget::ErrorBudget;
 use crate::base::error::Error;
 use crate::base::index::Index;
 use crate::base::math::fabs;
@@ -52,10 +55,6 @@ pub fn kept(scene: &Scene<'_>, goal: f64, max_bounces: Option<u32>) -> usize {
     let few = sweeps(q.min(1.0), goal) <= PLAIN_SWEEPS_MOST;
     if few || max_bounces.is_some() { 0 } else { HISTORY_SOLUTIONS + 1 }
 }
-
-/// Share of the goal that accelerated sweeps go on to: they are for rooms many times brighter than what lights them,
-/// which mirrors brighten once more.
-const FAST_GOAL_SHARE: f64 = 1e-2;
 
 /// How an iteration goes on, and when it ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,9 +128,15 @@ impl Acceleration {
 impl Solver {
     /// Before the first sweep of a system of contraction `q` (the largest over all rows). `inverse`: the bound that
     /// [`Solver::for_inverse_bound`] found, where [`Solver::is_closed`] asks for it; `fast`: there is a [`History`].
-    pub fn new(q: f64, inverse: Option<f64>, goal: f64, max_bounces: Option<u32>, fast: bool) -> Solver {
+    pub fn new(
+        q: f64,
+        inverse: Option<f64>,
+        budget: &ErrorBudget,
+        max_bounces: Option<u32>,
+        fast: bool,
+    ) -> Solver {
         let inverse = inverse.unwrap_or(1.0 / (1.0 - q).max(f64::MIN_POSITIVE));
-        let needed = sweeps(q, goal);
+        let needed = sweeps(q, budget.solver);
         let fast = fast && max_bounces.is_none() && needed > PLAIN_SWEEPS_MOST;
         // a sweep adds a reflection, and so does what sees the radiances
         let most = match max_bounces {
@@ -140,7 +145,7 @@ impl Solver {
             None => needed.saturating_add(200).min(100_000),
         };
         let acceleration = fast.then(|| Acceleration::new(q));
-        let goal = if fast { FAST_GOAL_SHARE * goal } else { goal };
+        let goal = if fast { budget.solver_accelerated } else { budget.solver };
         Solver { done: 0, error: f64::INFINITY, q, inverse, goal, most, acceleration }
     }
 
@@ -222,7 +227,7 @@ impl Solver {
 /// The latest solutions, from which the next is extrapolated.
 #[derive(Debug)]
 pub struct History<'m> {
-    /// What each row absorbs or lets out of a radiance of 1: the change that adding 1 everywhere makes up for.
+    /// Share that each row absorbs or lets out of a radiance of 1: the change that adding 1 everywhere makes up for.
     row_deficits: &'m [f64],
     solutions: &'m mut [f64],
     filled: usize,
@@ -390,11 +395,12 @@ mod tests {
 
     #[test]
     fn a_corridor_and_a_room_need_few_sweeps() {
+        let budget = ErrorBudget::new(1e-3, 1e-3);
         for (n, q, most) in [(6, 0.999, 150), (6, 1.0 - 1e-9, 200), (60, 0.9, 100), (60, 0.999, 1000)] {
             let g = corridor(n, q);
             // what is at one end is not at the other: not the uniform solution of the first step
             let b: Vec<f64> = (0..n).map(|i| if i < n / 3 { 1.0 } else { 0.0 }).collect();
-            let (x, _, solver) = solve(&g, &b, Solver::new(q, None, 1e-6, None, true));
+            let (x, _, solver) = solve(&g, &b, Solver::new(q, None, &budget, None, true));
             // energy: (1 - q) times the sum is what is sent out; rounding of 1 - q beside it
             let (sum, sent) = (x.iter().sum::<f64>() * (1.0 - q), b.iter().sum::<f64>());
             assert!((sum / sent - 1.0).abs() < 1e-6, "{n} cells, q {q}: {sum}, not {sent}");

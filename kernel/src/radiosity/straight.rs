@@ -2,7 +2,11 @@
 //!
 //! Each element is evaluated at the middles of its four quarters; where a linear function over it leaves out more than
 //! is wanted, as an edge of a shadow crosses it, at those of their quarters.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors) and `cargo test --test
+//! outlines` (outlines against rays).
 
+use crate::base::budget::ErrorBudget;
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces, span};
 use crate::base::math::{PI, Vec3, clamp, fabs, narrow, pow};
@@ -38,14 +42,6 @@ const ROW_SCALE_MOST: f64 = 2.0;
 /// 1 to 5e-16.
 pub const BLOCKED_ROUNDING: f64 = 1e-6;
 
-/// Mean square departure of what is blocked from a linear function, in squares of the goal, from which on quarters are cut
-/// again.
-const MOST_DEPARTURE: f64 = 4.0;
-
-/// Squared error of the mean, in squares of the goal, from which on the points are too few for a side that reflects nothing
-/// and of which the irradiance alone is asked: the row's rays tell the sky then.
-const MOST_MEAN: f64 = 0.5;
-
 /// Values of one unknown.
 pub fn stride(bands: usize) -> usize {
     3 * bands + 3
@@ -66,7 +62,7 @@ pub struct Straight<'a> {
 }
 
 impl<'a> Straight<'a> {
-    /// What is known of an unknown: its values, and their expected squared error.
+    /// Values of an unknown, and their expected squared error.
     #[inline]
     pub fn of(&self, unknown: usize, bands: usize) -> Option<(&'a [f64], f64)> {
         let variance = *self.variance.get(unknown)?;
@@ -75,7 +71,7 @@ impl<'a> Straight<'a> {
         (variance >= 0.0).then_some((values, f64::from(variance)))
     }
 
-    /// By what a row's entries are to be multiplied so that they fill what is known to be blocked: then all that it
+    /// Factor by which a row's entries are to be multiplied so that they fill what is known to be blocked: then all that it
     /// sees comes to the whole hemisphere.
     #[inline]
     pub fn scale(&self, unknown: usize, bands: usize, row: &Row) -> f64 {
@@ -91,7 +87,7 @@ impl<'a> Straight<'a> {
         }
     }
 
-    /// What is blocked of an unknown's hemisphere: mean and gradients; and the gradients by which those that a row's entries
+    /// Blocked share of an unknown's hemisphere: mean and gradients; and the gradients by which those that a row's entries
     /// have, times their scale, fall short of it, where the row is one of rays.
     pub fn blocked(&self, unknown: usize, bands: usize, row: &RowView<'_>) -> Option<Blocked> {
         let (values, _) = self.of(unknown, bands)?;
@@ -130,7 +126,7 @@ impl<'a> Straight<'a> {
     }
 }
 
-/// What is blocked of a hemisphere, mean and gradients; and by which gradients a row's entries fall short of it.
+/// Blocked share of a hemisphere, mean and gradients; and by which gradients a row's entries fall short of it.
 pub type Blocked = ([f64; 3], [f64; 2]);
 
 /// Which function of direction outlines integrate for a sky; `None` where they cannot.
@@ -147,7 +143,7 @@ pub fn irradiance(open: &OpenSky, sky: &Sky<'_>, out: &mut [f64]) {
     sky.open_irradiance(of(open.halves()), of(open.heights()), out);
 }
 
-/// What [`rows`] works on.
+/// Input of [`rows`].
 #[derive(Clone, Copy, Debug)]
 pub struct Looking<'a> {
     /// The scene.
@@ -164,6 +160,8 @@ pub struct Looking<'a> {
     pub reference: &'a [f64],
     /// Expected error of irradiance over pi to reach, relative to the largest radiance.
     pub goal: f64,
+    /// The wanted errors and their shares.
+    pub budget: &'a ErrorBudget,
     /// Depth of the smallest quarters that are evaluated ([`deepest`]).
     pub deepest: u32,
 }
@@ -229,7 +227,7 @@ fn row(
     let mut fit = fit(of, candidates, basis, unknown, 1)?;
     for depth in 2..=of.deepest {
         // what is blocked alone decides: a band has the same bits whatever others there are
-        if fit.departure(bands) <= MOST_DEPARTURE * goal {
+        if fit.departure(bands) <= of.budget.straight_departure * goal {
             break;
         }
         fit = self::fit(of, candidates, basis, unknown, depth)?;
@@ -244,18 +242,11 @@ fn row(
         // the row's rays have missed what hides the sky: nothing says what comes from there
         return None;
     }
-    for band in 0..=bands {
-        let [mean, a, b] = fit.linear(band);
-        let [at_mean, at_a, at_b] =
-            if band < bands { [0, 1, 2].map(|k| k * bands + band) } else { [0, 1, 2].map(|k| 3 * bands + k) };
-        values.set(at_mean, mean);
-        values.set(at_a, a);
-        values.set(at_b, b);
-    }
+    fit.write(bands, values);
     let departure = fit.largest_departure(of.reference, bands);
     // the mean of stratified points is wrong by an edge that crosses n^1/2 of their n quarters
     let of_mean = departure / pow(fit.points as f64, 1.5);
-    (reflects || of_mean <= MOST_MEAN * goal).then_some(departure + fit.error)
+    (reflects || of_mean <= of.budget.straight_mean * goal).then_some(departure + fit.error)
 }
 
 /// The straight sky of a cluster, as its row's rays tell it: points of it look for themselves.
@@ -396,6 +387,21 @@ impl Fit {
         // the weights' second moments over the points are s, s and -s/2, where 4/3 s is by how much u and v determine them
         let s = self.second_moment();
         [mean, (u + 0.5 * v) / (0.75 * s), (v + 0.5 * u) / (0.75 * s)]
+    }
+
+    /// Writes means and gradients of all bands, and those of the blocked share after them.
+    fn write(&self, bands: usize, values: &mut [f64]) {
+        for band in 0..=bands {
+            let [mean, a, b] = self.linear(band);
+            let [at_mean, at_a, at_b] = if band < bands {
+                [0, 1, 2].map(|k| k * bands + band)
+            } else {
+                [0, 1, 2].map(|k| 3 * bands + k)
+            };
+            values.set(at_mean, mean);
+            values.set(at_a, a);
+            values.set(at_b, b);
+        }
     }
 
     /// Sum of the squares of the weight of a corner less 1/3: 1/18 a point over the triangle, less that within the quarters.

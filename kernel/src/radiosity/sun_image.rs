@@ -5,6 +5,8 @@
 //! light. [`crate::radiosity::beam::add`] stores the directions of such suns for each side of a facet. Rays from a
 //! point toward them meet the mirrors or not, as the view's chains find. Light by way of lobes and curved mirrors, and
 //! that of sides with more images than there is room for, stays a mean over elements.
+//!
+//! Constants of this file are measured by `cargo test --test thrown_sun --test highlights` (errors of images of the sun).
 
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, pieces};
@@ -227,7 +229,7 @@ pub struct Image {
     pub number: u32,
     /// Its direction.
     pub axis: Vec3,
-    /// What shows it.
+    /// Mirrors that show it.
     pub mirrors: Mirrors,
 }
 
@@ -426,7 +428,7 @@ impl<'a> SunImages<'a> {
         list.any(|(packed, ..)| may_be(packed) && 1.0 - unpack(packed).dot(axis) < SEEN_DISTANCE_MOST)
     }
 
-    /// What such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.
+    /// Irradiance that such light gives an unknown on one level on the mean, one value per band; nothing where it stays a mean.
     #[inline]
     pub fn mean(&self, shape: TableShape, side: usize, unknown: usize, level: usize) -> &'a [f64] {
         if self.slots.is_empty() || !self.are_known(side) {

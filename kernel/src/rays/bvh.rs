@@ -3,6 +3,8 @@
 //! Two builders, [`Bvh::build`] and (with feature `std`) [`Bvh::build_obvhs`], make one layout, and one traversal
 //! reads it. Hits are those of [`ray::intersect`] over all facets, bit for bit: the least `t`, where facets coincide a
 //! front before a back, then the lowest facet index, whatever the builder and the instruction set.
+//!
+//! Constants of this file are measured by `cargo test --test bvh` (hits) and `cargo bench --bench counts` (instructions).
 
 mod above;
 mod bake;

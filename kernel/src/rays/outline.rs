@@ -11,6 +11,9 @@
 //!
 //! The edges are found once for a mesh (`edges.rs`), those that matter to the points of one facet once for that facet
 //! (`candidates.rs`).
+//!
+//! Constants of this file are measured by `cargo test --test outlines` (outlines against rays) and `cargo bench --bench
+//! counts` (instructions).
 
 mod candidates;
 mod circles;

@@ -1,5 +1,8 @@
 //! A point of a facet's side at which light is reflected: where rays from it start, its mirror direction, the rays of
 //! its lobe.
+//!
+//! Constants of this file are measured by `cargo test --release --test stress rays -- --nocapture` (rays that leak through
+//! closed meshes).
 
 use crate::base::index::Index;
 use crate::base::math::{Vec3, reflect, sqrt};
@@ -60,7 +63,7 @@ impl Surface {
         }
     }
 
-    /// What a hit met; `None` where it is the black back of a one-sided facet.
+    /// The surface that a hit met; `None` where it is the black back of a one-sided facet.
     #[inline]
     pub fn of_hit(scene: &Scene<'_>, hit: &Hit) -> Option<Surface> {
         if !hit.front && scene.sides() == 1 {
@@ -155,7 +158,7 @@ impl Surface {
     }
 }
 
-/// What mirrors at a point.
+/// Mirror reflection at a point.
 #[derive(Clone, Debug)]
 pub struct Mirror {
     /// Mirror class of the material.

@@ -1,5 +1,7 @@
 //! The region that a facet sweeps along a direction, or a narrow cone of them: what no facet reaches into stands in the way
 //! of no ray that leaves the facet so.
+//!
+//! Constants of this file are measured by `cargo test --test determinism` (the same bits as by rays alone).
 
 use crate::base::index::IndexMut;
 use crate::base::math::{Vec3, sqrt};

@@ -20,7 +20,7 @@ pub struct Light<'a> {
     pub emission: &'a [f64],
 }
 
-/// What a light is made from.
+/// Input of a light.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LightInput<'a> {
     /// The sky, if any.

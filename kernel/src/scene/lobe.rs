@@ -10,6 +10,8 @@
 //! the radial density C/((1 + p^2)(1 + T^2 p^2)), and what lies above the facet is the half plane
 //! x > -cot(theta). Along x the density integrates to closed forms, with which everything here works:
 //! F(x) = 1/2 + (asinh(T x) - asinh(x))/(2 ln T) is the energy below x, A(theta)/rho_0 = F(cot theta).
+//!
+//! Constants of this file are measured by `cargo test --test lobe` (errors).
 
 use crate::base::error::{Error, Field};
 use crate::base::math::{

@@ -1,4 +1,6 @@
 //! Rigid parts of a mesh: which facets move together, and where they stand.
+//!
+//! Constants of this file are measured by `cargo test --test poses` (images of moved parts).
 
 use super::{MaterialInput, Mesh, NO_NORMAL, Scene, check};
 use crate::base::error::Error;

@@ -2,6 +2,8 @@
 //!
 //! Uniform, hemisphere, overcast (Moon and Spencer) and gradient skies have closed forms; the general sky of
 //! ISO 15469 (`cie`) and sampled skies (`table`) are integrated numerically.
+//!
+//! Constants of this file are measured by `cargo test --test table_suns` (suns of sky tables).
 
 mod cie;
 pub mod record;
@@ -63,7 +65,7 @@ pub struct SkyTable<'a> {
     pub azimuth_zero: Option<[f64; 3]>,
 }
 
-/// What a sky is made from.
+/// Input of a sky.
 #[derive(Clone, Copy, Debug)]
 pub struct SkyInput<'a> {
     /// Dependence on direction.

@@ -5,7 +5,7 @@ use crate::base::math::{PI, TAU, Vec3, acos, asin, clamp, cos, frame, sin, sqrt,
 use crate::scene::MAX_BANDS;
 use crate::scene::sky::{RADIANCE_LARGEST, SpotSun, check_bands};
 
-/// What a sun is made from.
+/// Input of a sun.
 #[derive(Clone, Copy, Debug)]
 pub struct SunInput<'a> {
     /// Toward the centre of the sun; any length but zero.

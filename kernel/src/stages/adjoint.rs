@@ -1,4 +1,6 @@
 //! Derivatives of a weighted sum of radiances by all reflectances and emissions, by the transposed system.
+//!
+//! Constants of this file are measured by `cargo test --test gradients` (derivatives against differences).
 
 use super::light::{Lighting, Scratch};
 use crate::base::arena::{Arena, Need};

@@ -306,7 +306,7 @@ fn explain_view(
     each(&Explained { solved, sums, importance: &importance, report })
 }
 
-/// What a signature is made of and depends on.
+/// A signature with its parts and derivatives.
 #[derive(Debug)]
 pub struct Explained<'a> {
     /// The solved scene.

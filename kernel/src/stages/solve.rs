@@ -3,11 +3,13 @@
 
 use super::light::{Lighting, SHARES, Scratch};
 use super::{Executor, Largest};
+use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::narrow;
+use crate::coupling::element::Elements;
 use crate::radiosity::System;
 use crate::radiosity::accuracy::{self, Own};
-use crate::radiosity::direct;
+use crate::radiosity::direct::{self, TableShape};
 use crate::radiosity::limits;
 use crate::radiosity::solution::{Numbers, Solution, SolutionMemory};
 use crate::radiosity::solver::{History, Solver};
@@ -37,40 +39,27 @@ pub(super) fn solve<'m, X: Executor>(
     } = memory;
     let (sun, images) = (&*sun, SunImages { slots, reflected_irradiance });
     let shape = crate::settings::shape(settings.max_bounces, scene.bands());
-    let Scratch { direct, orders, own, carried, spread, dark, first: kept, .. } = scratch;
     let size = elements.unknowns() * shape.bands;
     let seen = Straight { values: straight, variance: straight_variance };
     let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
     let (mut before, mut bounds) = (0, None);
     if shape.levels == 1 {
-        let first = Solve { system: System { direct, ..system }, settings, reference: &*reference };
-        before = first.run(orders, irradiance, &mut bounds, run)?.map_or(0, |s| s.done);
-        copy(kept, orders.part(0..size));
-        system.lit_radiance(*dark, irradiance, reference);
-        let missed = orders.part_mut(size..2 * size);
-        run.rows(missed, shape.bands, 0.0, |range, out| {
-            system.gradient_source(range, irradiance, out);
-            Ok(())
-        })?;
-        direct::add(missed, shape, direct);
+        let tables = [&mut *reference, &mut *irradiance];
+        before = first_pass(&system, settings, scratch, tables, &mut bounds, run)?;
     }
+    let Scratch { direct, orders, own, carried, spread, dark, .. } = scratch;
     let last = Solve { system: System { direct, ..system }, settings, reference: &*reference };
     let sweeps = last.run(orders, irradiance, &mut bounds, run)?;
     if shape.levels > 1 {
         system.lit_radiance(*dark, irradiance, reference);
     }
     let reference = &*reference;
-    let at = if shape.levels == 1 { 0 } else { shape.levels };
-    let radiance = orders.part(at * size..(at + 1) * size);
-    limits::check_radiance(radiance, shape.bands)?;
+    let radiance = last_radiance(orders, shape, size)?;
     images.take_off(shape, |unknown| elements.facet_side(unknown), irradiance);
     system.fill_absent_rows(irradiance);
     errors(&system, radiance, reference, (own, carried), variance, run)?;
     add_lamps(&system, reference, *dark, variance);
-    for (unknown, (variance, spread)) in variance.iter_mut().zip(pieces(spread, SPREAD)).enumerate() {
-        let known = images.are_known(elements.facet_side(unknown));
-        *variance += narrow(sun_image::variance(spread, known));
-    }
+    add_images(elements, &images, spread, variance);
     let numbers = Numbers {
         reflected: seen.reflected(shape.stride(), reference, irradiance),
         brightest: limits::brightest(scene, light, reference, radiance),
@@ -78,9 +67,7 @@ pub(super) fn solve<'m, X: Executor>(
         sweeps: sweeps.map_or(shape.levels as u64, |s| u64::from(before + s.done)),
         sun_rays,
     };
-    let seen = Straight::default();
-    let system = System { scene, elements, coupling, light, direct: &[], sun, straight: seen, shape };
-    system.fill_absent_straight(straight, straight_variance);
+    fill_absent_straight(of, sun, straight, straight_variance);
     Ok(Solution {
         shape,
         reference,
@@ -91,6 +78,61 @@ pub(super) fn solve<'m, X: Executor>(
         variance,
         numbers,
     })
+}
+
+/// Radiances of the unknowns, `size` values, as the last sweep left them; all orders together where they are counted.
+///
+/// # Errors
+/// Radiances above 1e37.
+fn last_radiance(orders: &[f64], shape: TableShape, size: usize) -> Result<&[f64], Error> {
+    let at = if shape.levels == 1 { 0 } else { shape.levels };
+    let radiance = orders.part(at * size..(at + 1) * size);
+    limits::check_radiance(radiance, shape.bands)?;
+    Ok(radiance)
+}
+
+/// Fills the straight sky of unknowns that have none of their own.
+fn fill_absent_straight(of: &Lighting<'_>, sun: &[f64], values: &mut [f64], variance: &mut [f32]) {
+    let Lighting { scene, elements, coupling, light, settings, .. } = *of;
+    let shape = crate::settings::shape(settings.max_bounces, scene.bands());
+    let straight = Straight::default();
+    System { scene, elements, coupling, light, direct: &[], sun, straight, shape }
+        .fill_absent_straight(values, variance);
+}
+
+/// The first of two passes, where reflections are not counted: solves without what elements send by their gradients, and adds that
+/// to the direct light. Writes the reference radiance of the bands that lamps alone light, and keeps the radiances. Returns the
+/// number of sweeps. `system` is without its direct light.
+fn first_pass<X: Executor>(
+    system: &System<'_>,
+    settings: &Settings,
+    scratch: &mut Scratch<'_>,
+    [reference, irradiance]: [&mut [f64]; 2],
+    bounds: &mut Option<Bounds>,
+    run: &mut X,
+) -> Result<u32, X::Error> {
+    let Scratch { direct, orders, dark, first: kept, .. } = scratch;
+    let shape = system.shape;
+    let size = system.elements.unknowns() * shape.bands;
+    let first = Solve { system: System { direct, ..*system }, settings, reference: &*reference };
+    let sweeps = first.run(orders, irradiance, bounds, run)?.map_or(0, |s| s.done);
+    copy(kept, orders.part(0..size));
+    system.lit_radiance(*dark, irradiance, reference);
+    let missed = orders.part_mut(size..2 * size);
+    run.rows(missed, shape.bands, 0.0, |range, out| {
+        system.gradient_source(range, irradiance, out);
+        Ok(())
+    })?;
+    direct::add(missed, shape, direct);
+    Ok(sweeps)
+}
+
+/// Adds to the expected squared errors those of the images of the sun.
+fn add_images(elements: &Elements<'_>, images: &SunImages<'_>, spread: &mut [f32], variance: &mut [f32]) {
+    for (unknown, (variance, spread)) in variance.iter_mut().zip(pieces(spread, SPREAD)).enumerate() {
+        let known = images.are_known(elements.facet_side(unknown));
+        *variance += narrow(sun_image::variance(spread, known));
+    }
 }
 
 /// Adds to the expected squared errors that no ray of a row may have met a lamp: in those of the bands `dark`, as bits, in
@@ -202,7 +244,7 @@ impl Solve<'_> {
         if !known || max_bounces.is_some() {
             self.start(from, run)?;
         }
-        let mut solver = Solver::new(q, inverse, budget.solver, max_bounces, !history.is_empty());
+        let mut solver = Solver::new(q, inverse, &budget, max_bounces, !history.is_empty());
         let ends =
             self.iterate(&mut solver, [&mut *from, &mut *to], history, run, |range, from, to, relax| {
                 self.system.relaxed_sweep(range, from, to, self.reference, relax)

@@ -1,5 +1,7 @@
 //! The sky that elements see straight: their rows in pieces of scratch memory, copied to the solution in the order of the
 //! rows.
+//!
+//! Constants of this file are measured by `cargo bench --bench stages` (seconds).
 
 use super::Executor;
 use super::light::{Lighting, Scratch};
@@ -42,7 +44,8 @@ pub(super) fn fill<X: Executor>(
     let (Some(sky), false) = (&light.sky, memory.straight.is_empty()) else { return Ok(()) };
     let goal = settings::straight_goal(scene, &settings.budget);
     let deepest = straight::deepest(settings.all_irradiances);
-    let looking = Looking { scene, bvh, elements, coupling, sky, reference: memory.reference, goal, deepest };
+    let (reference, budget) = (&*memory.reference, &settings.budget);
+    let looking = Looking { scene, bvh, elements, coupling, sky, reference, goal, budget, deepest };
     let (bands, all) = (scene.bands(), elements.unknowns());
     let (part, stride) = (piece(bands)?, straight::stride(bands));
     let lanes = run.lanes().clamp(1, LOOKERS);

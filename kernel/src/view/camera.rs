@@ -1,4 +1,6 @@
 //! Where the observer stands: pixel rays of orthographic and perspective cameras.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors).
 
 use crate::base::error::{Error, Field};
 use crate::base::index::Index;

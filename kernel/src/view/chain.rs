@@ -1,5 +1,8 @@
 //! Eq. (15) along one ray: diffuse radiance of each facet that the specular chain meets, times the mirrors
 //! before it, and the sky where the chain leaves the object.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors) and `cargo test --test gloss`
+//! (errors of lobes).
 
 mod fine_detail;
 mod gather;
@@ -26,6 +29,7 @@ use crate::rays::bvh::Bvh;
 use crate::rays::ray::{Hit, Ray};
 use crate::rays::surface::{Mirror, Surface};
 use crate::scene::light::Light;
+use crate::scene::sun::Sun;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::view::camera::Camera;
 use crate::view::importance::Importance;
@@ -162,7 +166,7 @@ plain_table! {
 }
 
 plain_table! {
-    /// What a chain needs while it is followed, of any content: too large for small stacks.
+    /// Scratch memory of a chain while it is followed, of any content: too large for small stacks.
     pub struct ChainScratch {
         /// Product of the reflectances along the chain, and along a ray of a lobe.
         pub throughput: [[f64; MAX_BANDS]; 2],
@@ -172,9 +176,9 @@ plain_table! {
         pub squares: [f64; MAX_BANDS],
         /// The sums before the latest ray.
         pub before: [f64; MAX_BANDS],
-        /// What an image of the sun brings, and the product of the reflectances on the way to it.
+        /// Light of an image of the sun, and the product of the reflectances on the way to it.
         pub images: [[f64; MAX_BANDS]; 2],
-        /// What rays from a point bring.
+        /// Sums of final gathering.
         pub gathered: Gathered,
     }
 }
@@ -228,7 +232,7 @@ impl Terms {
     }
 }
 
-/// What a ray met besides its radiance.
+/// Record of a ray besides its radiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Path {
     /// True where the first ray met the object.
@@ -243,14 +247,26 @@ pub struct Path {
     pub signed: [f64; SIGNS],
     /// Expected error from sampling lobes, relative to the reference radiance.
     pub noise: f64,
-    /// What n rays like this one miss of highlights that are seen in lobes, times n: the geometric mean of the brightest
+    /// Light that n rays like this one miss of highlights that are seen in lobes, times n: the geometric mean of the brightest
     /// that the ray has met and of how bright it is at its middle, relative to the reference radiance.
     pub glare: f64,
-    /// What the sun's disc brings on the mean to who meets it by chance alone, where mirrors show it that were not asked
+    /// Radiance that the sun's disc brings on the mean to who meets it by chance alone, where mirrors show it that were not asked
     /// where: its irradiance over all directions, relative to the reference radiance.
     pub chance: f64,
     /// True where a lobe or a penumbra was met, whose radiance is a mean of rays.
     pub sampled: bool,
+}
+
+impl Path {
+    /// Notes an element's expected squared error, of which the ray brings a share, and where asked its sums with signs.
+    #[inline]
+    fn note_error(&mut self, unknown: usize, weight: f64, variance: f64, counts_signs: bool) {
+        self.variance += weight * weight * variance;
+        if counts_signs {
+            let error = weight * sqrt(variance);
+            self.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
+        }
+    }
 }
 
 /// Which ray of an image it is, so that lobes and penumbrae of different rays are sampled apart.
@@ -349,6 +365,39 @@ struct PathState<'w> {
     step: f64,
     /// For rays from a point: where they go on diffusely.
     onward: Option<Onward<'w>>,
+}
+
+/// Irradiance of a point by its parts.
+struct Arriving<'a> {
+    /// Mean and gradients over its element, in `bands` bands.
+    values: &'a [f64],
+    bands: usize,
+    /// Where it is on the element.
+    local: Local,
+    /// The straight sky at the point itself, in place of the element's.
+    open: Option<&'a OpenAt<'a>>,
+    /// Irradiance that final gathering adds, one value per band.
+    correction: &'a [f64],
+    /// Mean over the element by images of the sun, one value per band.
+    reflected_irradiance: &'a [f64],
+    /// The sun, where it shines on the point, and the share of its irradiance.
+    sun: Option<&'a Sun<'a>>,
+    sunlit: f64,
+}
+
+impl Arriving<'_> {
+    /// The sum of all in one band.
+    #[inline]
+    fn irradiance(&self, band: usize) -> f64 {
+        let mut irradiance = held(self.values, self.bands, self.local, self.open, band);
+        irradiance = (irradiance + self.correction.at(band)).max(0.0);
+        irradiance +=
+            self.open.map_or(0.0, |open| open.irradiance.at(band)) + self.reflected_irradiance.at(band);
+        if let Some(sun) = self.sun {
+            irradiance += self.sunlit * sun.irradiance(band);
+        }
+        irradiance
+    }
 }
 
 /// 1/p and 1/p^2 of the plastic number p, the root of p^3 = p + 1.
@@ -793,12 +842,7 @@ impl Solved<'_> {
     ) {
         let bands = self.shape.bands;
         let to = if state.mirrors == 0 { &mut terms.diffuse } else { &mut terms.mirror_diffuse };
-        let emission = self.light.emission(self.scene, surface.facet, surface.side);
-        let emitted = to.iter_mut().zip(state.throughput.iter()).zip(emission);
-        emitted.for_each(|((to, throughput), own)| *to += throughput * own);
-        if let Some(importance) = mode.importance.as_deref_mut() {
-            importance.meet(surface, state.throughput.head(bands), &*to);
-        }
+        self.add_emission(state, surface, mode, to);
         let Some(level) = self.level(state.mirrors) else { return };
         let diffuse = self.scene.diffuse(surface.material);
         if diffuse.iter().all(|&d| d == 0.0) {
@@ -819,21 +863,12 @@ impl Solved<'_> {
         };
         let sun = self.light.sun.as_ref().filter(|_| sunlit > 0.0);
         if goes_on {
-            if let Some(sun) = sun {
-                let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
-                own.enumerate().for_each(|(band, ((to, throughput), rho))| {
-                    *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
-                });
-            }
-            return;
+            return self.add_sunlit(state, surface, sun.map(|sun| (sun, sunlit)), to);
         }
-        let mut weight = 0.0;
-        for (throughput, rho) in state.throughput.iter().zip(diffuse) {
-            weight = f64::max(weight, throughput * rho);
-        }
+        let weight = state.throughput.iter().zip(diffuse).fold(0.0, |most, (t, rho)| f64::max(most, t * rho));
         let values = self.irradiance.part(self.shape.at(unknown, level));
-        let bounces = state.mirrors;
-        let point = GatherPoint { surface, unknown, values, local, weight, bounces, open: None };
+        let point =
+            GatherPoint { surface, unknown, values, local, weight, bounces: state.mirrors, open: None };
         // a ray from a point, or of a lobe
         let counts_signs = state.gathered.is_none();
         let gathered = state.gathered.as_deref_mut();
@@ -841,28 +876,53 @@ impl Solved<'_> {
         let (correction, variance) =
             self.beyond_element(&point, state.far, (gathered, state.images), mode, path, &mut open);
         let open = open.as_ref();
+        let arriving = Arriving { values, bands, local, open, correction, reflected_irradiance, sun, sunlit };
         for (band, ((to, throughput), rho)) in
             to.iter_mut().zip(state.throughput.iter()).zip(diffuse).enumerate()
         {
-            let mut irradiance = held(values, bands, local, open, band);
-            irradiance = (irradiance + correction.at(band)).max(0.0);
-            irradiance += open.map_or(0.0, |open| open.irradiance.at(band)) + reflected_irradiance.at(band);
-            if let Some(sun) = sun {
-                irradiance += sunlit * sun.irradiance(band);
-            }
             // eq. (15): I_d prod rho_s, with the reflected part of eq. (12), I_d = rho_d E/pi
             let share = throughput * rho;
-            *to += share * FRAC_1_PI * irradiance;
+            *to += share * FRAC_1_PI * arriving.irradiance(band);
         }
         if let Some(importance) = mode.importance.as_deref_mut() {
             let at = (unknown, local, open.map_or(1.0, |open| open.ratio));
             importance.reflect(surface, at, (diffuse, state.throughput.head(bands)), &*to);
         }
-        path.variance += weight * weight * variance;
-        if counts_signs {
-            let error = weight * sqrt(variance);
-            path.signed.iter_mut().enumerate().for_each(|(set, sum)| *sum += sign(unknown, set) * error);
+        path.note_error(unknown, weight, variance, counts_signs);
+    }
+
+    /// Adds a facet's own diffuse radiance toward the chain, times the throughput.
+    #[inline]
+    fn add_emission(
+        &self,
+        state: &PathState<'_>,
+        surface: &Surface,
+        mode: &mut Mode<'_, '_>,
+        to: &mut [f64; MAX_BANDS],
+    ) {
+        let emission = self.light.emission(self.scene, surface.facet, surface.side);
+        let emitted = to.iter_mut().zip(state.throughput.iter()).zip(emission);
+        emitted.for_each(|((to, throughput), own)| *to += throughput * own);
+        if let Some(importance) = mode.importance.as_deref_mut() {
+            importance.meet(surface, state.throughput.head(self.shape.bands), &*to);
         }
+    }
+
+    /// Adds the sunlight that arrives straight and is reflected diffusely, of which a share is not hidden.
+    #[inline]
+    fn add_sunlit(
+        &self,
+        state: &PathState<'_>,
+        surface: &Surface,
+        sun: Option<(&Sun<'_>, f64)>,
+        to: &mut [f64; MAX_BANDS],
+    ) {
+        let Some((sun, sunlit)) = sun else { return };
+        let diffuse = self.scene.diffuse(surface.material);
+        let own = to.iter_mut().zip(state.throughput.iter()).zip(diffuse);
+        own.enumerate().for_each(|(band, ((to, throughput), rho))| {
+            *to += throughput * rho * FRAC_1_PI * sunlit * sun.irradiance(band);
+        });
     }
 
     /// The level of the irradiance table that counts for a facet behind `mirrors` mirrors; `None` where its reflection
@@ -877,7 +937,7 @@ impl Solved<'_> {
         Some(level.min(self.shape.levels.saturating_sub(1)))
     }
 
-    /// What is known at a point beyond its element's linear function: `open`, the straight sky, where the element's leaves
+    /// Irradiance at a point beyond its element's linear function: `open`, the straight sky, where the element's leaves
     /// too much of it; irradiance that final gathering adds, one value per band, where the element's expected error is too
     /// large; and the expected squared error of irradiance over pi, relative to the reference radiance.
     #[inline]

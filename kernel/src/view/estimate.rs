@@ -1,4 +1,6 @@
 //! The error estimate of an image: its parts, their sum and the largest of them.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (true errors beside estimates).
 
 use crate::base::math::sqrt;
 use crate::view::chain::CAUTION;

@@ -1,5 +1,8 @@
 //! Images: eq. (15) along the ray through each pixel's centre, and along more rays where the radiance changes from
 //! pixel to pixel.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors of pixels) and `cargo bench
+//! --bench counts` (instructions).
 
 mod centres;
 mod line_integral;
@@ -22,7 +25,7 @@ use centres::Centres;
 use core::ops::Range;
 use line_integral::{Fineness, Measure, integrate};
 
-/// What was done on a range of rows; ranges add up with [`Tally::add`].
+/// Counts of the work on a range of rows; ranges add up with [`Tally::add`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
     /// Pixels whose centre ray meets the object.
@@ -234,12 +237,12 @@ plain_table! {
         pub sums: Terms,
         /// Sums of squares.
         pub squares: [f64; MAX_BANDS],
-        /// What parallel rays see beside the object.
+        /// Radiance that parallel rays see beside the object.
         pub background: Terms,
     }
 }
 
-/// What rays through pixel centres meet.
+/// First hits of rays through pixel centres.
 struct Primary<'m> {
     items: Items<'m>,
     /// Whether facets are drawn, rather than rays traced.
@@ -334,7 +337,7 @@ impl<'a, 's> Painter<'a, 's> {
         })
     }
 
-    /// What parallel rays have in common: their line, and what they see beside the object.
+    /// Finds the common parts of parallel rays: their line, and what they see beside the object.
     #[inline(never)]
     fn look_beside(&mut self) {
         let ray = self.camera.ray(0.0, 0.0);
@@ -501,7 +504,7 @@ impl<'a, 's> Painter<'a, 's> {
         self.camera.ray(column as f64 + 0.5, row as f64 + 0.5)
     }
 
-    /// What the ray through a pixel's centre meets, `facet` for all that is known.
+    /// First hit of the ray through a pixel's centre, `facet` for all that is known.
     #[inline]
     fn first_hit(
         &self,
@@ -662,7 +665,7 @@ impl<'a, 's> Painter<'a, 's> {
         let seed = hash2(row as u32, column as u32);
         let (turn, _) = Sequence::new(seed).pair(0, 0);
         let before = tally.primary;
-        let goal = 0.7 * goal;
+        let goal = solved.settings.budget.lines * goal;
         let parts = if solved.settings.budget.image < FINE_PIXELS { PIXEL_PARTS_FINE } else { PIXEL_PARTS };
         let mut line = |y: f64, out: &mut [f64]| {
             let shift = turn + PLACE_SHIFT * y;

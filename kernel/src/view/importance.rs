@@ -28,11 +28,11 @@ pub struct Importance<'m> {
     pub diffuse: &'m mut [f64],
     /// Derivative by the emission of each facet and side.
     pub emission: &'m mut [f64],
-    /// What rays bring that meet each facet first, by facet: they add up to the sum.
+    /// Radiant intensity by the rays that meet each facet first, by facet: they add up to the sum.
     pub shares: &'m mut [f64],
     /// The sum's [`TERMS`].
     pub terms: &'m mut [f64],
-    /// What a radiance of 1 along the present ray adds.
+    /// Weight of the present ray: the sum's change by a radiance of 1 along it.
     weight: f64,
     /// Radiance of the present ray before what is noted of it.
     before: &'m mut [f64],

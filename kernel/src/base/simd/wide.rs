@@ -42,7 +42,7 @@ pub trait Lanes64: Copy {
 
 /// A computation in [`Wide`] lanes; `run` must be `#[inline(always)]`.
 pub trait WideTask {
-    /// What it returns.
+    /// Its result.
     type Out;
     /// Does it.
     fn run<L: Lanes64>(self, lanes: L) -> Self::Out;
@@ -55,7 +55,7 @@ const FRACTION: u64 = (1 << 52) - 1;
 const EXPONENT_OF_ONE: u64 = 1023 << 52;
 /// 2^52: its fraction's bits hold an integer.
 const INTEGER: u64 = 1075 << 52;
-/// What is then taken off to give the exponent.
+/// Offset that is then taken off to give the exponent.
 const BIAS: f64 = ((1u64 << 52) + 1023) as f64;
 
 /// Lanes as arrays: any processor.

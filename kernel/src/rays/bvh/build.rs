@@ -1,6 +1,8 @@
 //! The compact builder: a binary tree by the binned surface area heuristic, in place and without recursion.
 //!
 //! This work is based on I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007.
+//!
+//! Constants of this file are measured by `cargo bench --bench counts` (instructions of `tree`, `closest` and `occluded`).
 
 use super::{Boxes, MOST_LEVELS, PACKET_LANES};
 use crate::base::arena::{Arena, Need};

@@ -4,7 +4,7 @@ use super::build::{Aabb, Binary};
 use super::{Boxes, LEAF_CHILD, NO_LANE_FACET, PACKET_LANES, PAIR};
 use crate::base::index::{Index, IndexMut};
 
-/// What came out.
+/// Size of the tree of nodes of eight.
 pub(super) struct Made {
     pub nodes: usize,
     pub packets: usize,

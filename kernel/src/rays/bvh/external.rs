@@ -1,4 +1,6 @@
 //! A ray tracer of the caller's in place of the tree.
+//!
+//! Constants of this file are measured by `cargo test --test c_library` (calls of a caller's tracer).
 
 use super::{Bvh, traverse};
 use crate::base::index::{Index, IndexMut};
@@ -40,7 +42,7 @@ impl fmt::Debug for External<'_> {
 
 // None of these is compiled into its callers, which are many and as a rule have no such tracer.
 impl External<'_> {
-    /// What the tracer says, or `tree`.
+    /// The tracer's answer, or that of `tree`.
     #[inline(never)]
     pub fn closest(&self, tree: &Bvh<'_>, ray: &Ray) -> Option<Hit> {
         let mut facet = [NO_FACET];
@@ -63,7 +65,7 @@ impl External<'_> {
         }
     }
 
-    /// What the tracer says.
+    /// The tracer's answer.
     #[inline(never)]
     pub fn any(&self, tree: &Bvh<'_>, ray: &Ray) -> bool {
         let mut hit = [0];
@@ -71,7 +73,7 @@ impl External<'_> {
         hit[0] != 0
     }
 
-    /// What the tracer says of many rays, or `tree`.
+    /// The tracer's answers to many rays, or those of `tree`.
     #[inline(never)]
     pub fn closest_many(&self, tree: &Bvh<'_>, rays: &[Ray], hits: &mut [Option<Hit>]) {
         let mut facets = [NO_FACET; INTERSECTOR_RAYS_MOST];
@@ -85,7 +87,7 @@ impl External<'_> {
         }
     }
 
-    /// What the tracer says of many rays.
+    /// The tracer's answers to many rays.
     #[inline(never)]
     pub fn any_many(&self, tree: &Bvh<'_>, rays: &[Ray], occluded: &mut [bool]) {
         let mut answers = [0; INTERSECTOR_RAYS_MOST];

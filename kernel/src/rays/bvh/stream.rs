@@ -3,6 +3,8 @@
 //! Each node is tested by all rays of a group that meet it before the next is: the boxes stay in registers and cache,
 //! and nothing that a ray finds decides where another goes, so that the processor works ahead. Children follow in the
 //! order of their distance from the ray to which they are nearest.
+//!
+//! Constants of this file are measured by `cargo bench --bench stages` (seconds).
 
 use super::traverse::{self, LaneRay, STACK_SHORT, TraversalRay};
 use super::{Bvh, LEAF_CHILD, PAIR, STACK};
@@ -19,7 +21,7 @@ const RAY_SET_WORDS: usize = STREAM_RAYS.div_ceil(32);
 
 type Set = [u32; RAY_SET_WORDS];
 
-/// What is left to visit: a child and the rays that meet it, none of them before `near`.
+/// A child that is left to visit, and the rays that meet it, none of them before `near`.
 #[derive(Clone, Copy)]
 struct Visit {
     near: f32,

@@ -13,6 +13,9 @@
 //! 55 u s where the origin is within 4 s: less than e = 4 `pad`. The images of a facet that the ray meets surround
 //! the origin and are no farther from it than twice the facet's extent x; products and rounding then leave its
 //! edge functions off by less than e (8.5 x + 2.3 e). Nothing is turned down for less than e (16 x + 4 e).
+//!
+//! Constants of this file are measured by `cargo test --test bvh` (no hit is lost) and `cargo bench --bench counts`
+//! (instructions).
 
 #[cfg(not(target_pointer_width = "32"))]
 use super::STACK;
@@ -218,7 +221,7 @@ pub(super) struct TraversalRay {
     /// Where the f32 origin stands on the ray, and how far it was moved outward.
     start: f64,
     pad: f64,
-    /// What is met first so far.
+    /// The first hit so far.
     first: First,
 }
 

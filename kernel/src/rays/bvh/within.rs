@@ -1,4 +1,6 @@
 //! Facets that reach into a convex region: of a row of pixels, or of parallel rays that leave a facet.
+//!
+//! Constants of this file are measured by `cargo test --test bvh` (no facet is lost).
 
 use super::path_stack::{EMPTY_STACK, push, top};
 use super::{Boxes, Bvh, LEAF_CHILD, PACKET_LANES, PAIR, Packet};
@@ -33,7 +35,7 @@ impl Bvh<'_> {
         Some(([a, b, c], normal))
     }
 
-    /// What the ray meets of this facet, in the arithmetic of all hits; `line` is the ray's, or that of a parallel one.
+    /// The ray's hit with this facet, in the arithmetic of all hits; `line` is the ray's, or that of a parallel one.
     #[inline]
     pub(crate) fn meet(&self, line: &Line, ray: &Ray, facet: u32) -> Option<Hit> {
         let &[a, b, c, normal] = self.solids.get(facet as usize)?;

@@ -1,4 +1,7 @@
 //! The outlines of one facet: the edges that are outlines from some of its points, and the facets over their pole.
+//!
+//! Constants of this file are measured by `cargo test --test outlines` (outlines against rays) and `cargo bench --bench
+//! counts` (instructions).
 
 use super::contour::{self, Contour, spread, sweep};
 use super::groups::{Below, BelowLanes, GROUP};
@@ -82,7 +85,7 @@ impl Frame {
 }
 
 plain_struct! {
-    /// What was found for a side of a facet.
+    /// Outlines of a side of a facet.
     pub struct List {
         /// Twice the facet and the side, and one; 0: nothing.
         pub side: u32,
@@ -242,7 +245,7 @@ impl<'m> Candidates<'m> {
         fits.then_some(count)
     }
 
-    /// What is open over a point of the facet that was prepared; circles are added until the expected error is at most
+    /// The open sky over a point of the facet that was prepared; circles are added until the expected error is at most
     /// `goal`, as far as that goes. `None` where there is too much.
     pub fn open(
         &mut self,
@@ -328,7 +331,7 @@ fn bounded([all, high, near, near_high]: [f64; 4], whole: [f64; 4], above: bool)
     [all, near_high + far_high, near, near_high]
 }
 
-/// What is straight over a point: all facets, those that count, and the backs less the fronts of closed bodies.
+/// Facets straight over a point: all facets, those that count, and the backs less the fronts of closed bodies.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Over {
     pub all: i32,
@@ -374,15 +377,16 @@ impl WideTask for Sort<'_> {
     #[inline(always)]
     fn run<L: Lanes64>(self, lanes: L) -> (usize, bool) {
         let Sort { outlines, corners, normal, own, height, out } = self;
-        let shared = [own.0.x, own.0.y, own.0.z, own.1];
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
         let radius = sqrt(corners.iter().map(|c| (*c - centre).length_squared()).fold(0.0, f64::max));
         let below = BelowLanes::new(lanes, &Below { centre, radius, normal, height });
-        let n = spread(lanes, normal);
-        let corners = [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])];
-        let (least, doubt, zero) =
-            (lanes.all(height + OUTLINE_HEIGHT_SLACK), lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0));
-        let close = lanes.all(SHARED_PLANE_SLACK);
+        let rises = Rises {
+            lanes,
+            normal: spread(lanes, normal),
+            corners: [spread(lanes, corners[0]), spread(lanes, corners[1]), spread(lanes, corners[2])],
+            own: [own.0.x, own.0.y, own.0.z, own.1],
+            least: lanes.all(height + OUTLINE_HEIGHT_SLACK),
+        };
         let (mut count, mut mattering) = (0, u32::MAX);
         let groups = outlines.block_groups;
         let (all, run) =
@@ -397,29 +401,7 @@ impl WideTask for Sort<'_> {
             }
             for number in group * run..(group + 1) * run {
                 let Some(block) = outlines.blocks.get(number) else { break };
-                let row = |k: usize| lanes.of(&block[k]);
-                let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
-                let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
-                let mut kept = L::F::bits(low.max(other).gt(least));
-                if kept == 0 {
-                    continue;
-                }
-                let first = heights(zero, &corners, [row(6), row(7), row(8), row(9)]);
-                let other = heights(zero, &corners, [row(10), row(11), row(12), row(13)]);
-                let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
-                let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
-                let rim = !L::F::bits(row(15).abs().gt(zero));
-                let near =
-                    |(low, top): (L::F, L::F)| L::F::bits(low.gt(zero - close)) & L::F::bits(close.gt(top));
-                let mut own = [near(first) & kept, near(other) & kept];
-                if own[0] | own[1] != 0 {
-                    // a plane that is the same only to rounding rises above itself here and there
-                    for (k, x) in shared.into_iter().enumerate() {
-                        own[0] &= !L::F::bits((row(6 + k) - lanes.all(x)).abs().gt(zero));
-                        own[1] &= !L::F::bits((row(10 + k) - lanes.all(x)).abs().gt(zero));
-                    }
-                }
-                kept &= !same | rim | own[0] | own[1];
+                let (mut kept, own) = rises.of(block);
                 let last = outlines.edges.saturating_sub(number * WIDTH);
                 if last < WIDTH {
                     kept &= (1 << last) - 1;
@@ -447,6 +429,50 @@ impl WideTask for Sort<'_> {
             }
         }
         (count, true)
+    }
+}
+
+/// A facet in every lane, above whose plane edges are to rise.
+struct Rises<L: Lanes64> {
+    lanes: L,
+    normal: [L::F; 3],
+    corners: [[L::F; 3]; 3],
+    /// As [`Sort::own`], one number after the other.
+    own: [f64; 4],
+    /// Height above which an edge counts.
+    least: L::F,
+}
+
+impl<L: Lanes64> Rises<L> {
+    /// The edges of a block that rise above the plane and are outlines from some point of the facet, as bits; and those whose
+    /// planes, the first and the other, are the facet's own.
+    #[inline(always)]
+    fn of(&self, block: &Block) -> (u32, [u32; 2]) {
+        let (lanes, n) = (self.lanes, self.normal);
+        let (doubt, zero, close) =
+            (lanes.all(PLANE_HEIGHT_ROUNDING), lanes.all(0.0), lanes.all(SHARED_PLANE_SLACK));
+        let row = |k: usize| lanes.of(&block[k]);
+        let low = n[0] * row(0) + n[1] * row(1) + n[2] * row(2);
+        let other = n[0] * row(3) + n[1] * row(4) + n[2] * row(5);
+        let kept = L::F::bits(low.max(other).gt(self.least));
+        if kept == 0 {
+            return (0, [0; 2]);
+        }
+        let first = heights(zero, &self.corners, [row(6), row(7), row(8), row(9)]);
+        let other = heights(zero, &self.corners, [row(10), row(11), row(12), row(13)]);
+        let (low, top) = (zero - (zero - first.0).max(zero - other.0), first.1.max(other.1));
+        let same = L::F::bits(low.gt(doubt)) | L::F::bits((zero - doubt).gt(top));
+        let rim = !L::F::bits(row(15).abs().gt(zero));
+        let near = |(low, top): (L::F, L::F)| L::F::bits(low.gt(zero - close)) & L::F::bits(close.gt(top));
+        let mut own = [near(first) & kept, near(other) & kept];
+        if own[0] | own[1] != 0 {
+            // a plane that is the same only to rounding rises above itself here and there
+            for (k, x) in self.own.into_iter().enumerate() {
+                own[0] &= !L::F::bits((row(6 + k) - lanes.all(x)).abs().gt(zero));
+                own[1] &= !L::F::bits((row(10 + k) - lanes.all(x)).abs().gt(zero));
+            }
+        }
+        (kept & (!same | rim | own[0] | own[1]), own)
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) fn sweep(
 struct Sweep<'a> {
     frame: &'a Frame,
     blocks: &'a [Block],
-    /// By what backs count of bodies with a rim.
+    /// Weight of the backs of bodies with a rim.
     back: f64,
     active: &'a mut [Active],
 }
@@ -125,7 +125,7 @@ fn unit<L: Lanes64>(lanes: L, [x, y, z]: [L::F; 3]) -> [L::F; 3] {
     [x / length, y / length, z / length]
 }
 
-/// What the outlines add to the facets over the pole, each part of the basis over pi.
+/// Sum over the outlines, beside the facets over the pole, each part of the basis over pi.
 pub(super) struct Contour<'a> {
     pub frame: &'a Frame,
     pub basis: Basis,

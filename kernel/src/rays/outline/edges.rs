@@ -1,4 +1,6 @@
 //! The edges of a mesh: which facets meet in them, and which share a plane.
+//!
+//! Constants of this file are measured by `cargo test --test outlines` (outlines against rays).
 
 use super::{BOTH, Block, plane, product};
 use crate::base::arena::{Arena, Need};

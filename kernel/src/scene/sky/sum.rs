@@ -1,4 +1,6 @@
 //! Radiance of a sky summed over many directions at once.
+//!
+//! Constants of this file are measured by `cargo test --test sky` (errors of sums).
 
 use super::{Model, Sky};
 use crate::base::index::IndexMut;

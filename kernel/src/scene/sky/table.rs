@@ -1,4 +1,6 @@
 //! Skies given by samples, bilinear in elevation and azimuth.
+//!
+//! Constants of this file are measured by `cargo test --test table_suns` (suns of sky tables).
 
 use super::{RADIANCE_LARGEST, SkyTable};
 use crate::base::error::{Error, Field};
@@ -16,7 +18,7 @@ pub(super) struct Table<'a> {
     x: Vec3,
     y: Vec3,
     up: Vec3,
-    /// What was taken out as a sun.
+    /// The spot that was taken out as a sun.
     spot: Option<Spot>,
 }
 

@@ -2,6 +2,8 @@
 //!
 //! The coupling samples an element as a whole and may have missed such detail, and the linear function over the element
 //! does not show its shadow. Where an image resolves the detail, final gathering ([`super::gather`]) is used instead.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors beside fine detail).
 
 use super::Solved;
 use super::gather::GATHERS;

@@ -10,6 +10,8 @@
 //! Where a ray is short beside the element that it meets, the element's linear function is not accurate there either:
 //! beside contact lines, where a body is pierced by another. The ray goes on diffusely from there, as a path, until it
 //! is not.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors beside estimates).
 
 use super::straight::KeptSkies;
 use super::{DetailCache, Mode, OpenAt, Path, PathState, RaySample, SIGNS, Solved, Terms, held};
@@ -52,10 +54,6 @@ const GATHER_RAYS_FACTOR_MOST: f64 = 4.0;
 /// Number of sets into which the rays from a point are divided; the differences between them tell the error of the
 /// mean.
 const GATHER_SETS: usize = 8;
-
-/// Error that the rays from a point are to reach, in wanted errors of the image. Measured by `cargo run --release
-/// --example calibrate`.
-const GATHER_GOAL: f64 = 0.55;
 
 /// Largest axis ratio of lobes in a scene in whose reflected sunlight points still gather: what narrower lobes reflect
 /// of the sun, few rays meet.
@@ -122,7 +120,7 @@ plain_table! {
         pub count: u64,
         /// The straight sky at points of elements.
         pub skies: KeptSkies,
-        /// What stands about the latest element; none at first.
+        /// Surroundings of the latest element; none at first.
         pub details: DetailCache,
     }
 }
@@ -251,7 +249,7 @@ pub(super) struct GatherPoint<'a> {
     /// Irradiance of its element, mean and gradients, and where on it the point is.
     pub values: &'a [f64],
     pub local: Local,
-    /// What a radiance of 1 brings to the image.
+    /// Weight of the point in the image.
     pub weight: f64,
     /// Reflections between it and the eye.
     pub bounces: u32,
@@ -347,7 +345,8 @@ impl Solved<'_> {
         let sequence = Sequence::new(seed);
         let axes = frame(gather_point.surface.normal);
         let tolerance = self.settings.budget.image / gather_point.weight;
-        let goal = (GATHER_GOAL * tolerance) * (GATHER_GOAL * tolerance);
+        let goal = self.settings.budget.gathering_rays * tolerance;
+        let goal = goal * goal;
         let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST } else { GATHER_SKY_RAYS_FEWEST };
         let least = clamp(
             GATHER_RAYS_FACTOR_LEAST * usual_rays(tolerance / self.spread_at(gather_point)),

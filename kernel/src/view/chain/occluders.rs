@@ -1,5 +1,7 @@
 //! A cache of occluders: the facets that may stand before a flat facet in one direction. Mostly there are none, and
 //! rays that leave it need not be traced.
+//!
+//! Constants of this file are measured by `cargo bench --bench counts` (instructions).
 
 use super::Solved;
 use crate::base::arena::plain_struct;
@@ -44,7 +46,7 @@ const LISTS_KEPT: usize = 512;
 const OCCLUDERS_TOO_MANY: u32 = u32::MAX;
 
 plain_struct! {
-    /// What may stand before one side of a facet in one direction.
+    /// Facets that may stand before one side of a facet in one direction.
     pub struct Occluders {
         /// Twice the facet and the side.
         pub side: u32,
@@ -103,7 +105,7 @@ pub struct OccluderCache<'m> {
     lists: &'m mut [Occluders],
     /// None for a single ray: they are too large to be set up for it.
     images: Option<Images>,
-    /// What may be outlines from points of facets.
+    /// Candidates for outlines from points of facets.
     pub(super) candidates: Candidates<'m>,
     /// Whether first rays are parallel.
     parallel: bool,

@@ -1,4 +1,6 @@
 //! The straight sky at a point, by outlines, in place of its element's linear function.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors).
 
 use super::gather::{BANDS, PIXEL_ELEMENTS_KEPT, find};
 use super::{OccluderCache, Solved, linear};
@@ -9,13 +11,6 @@ use crate::coupling::element::Local;
 use crate::radiosity::straight;
 use crate::rays::surface::Surface;
 use crate::scene::MAX_BANDS;
-
-/// Largest share of the wanted error of images that circles may leave at a point.
-const CIRCLES_ERROR_SHARE: f64 = 0.25;
-
-/// Share of the wanted error of images above which an element's linear function leaves too much of the straight sky at
-/// a point.
-const OPEN_SKY_ERROR_SHARE: f64 = 0.25;
 
 /// Largest factor, either way, by which the blocked share at a point may differ from the element's linear function.
 /// Beyond it the light from what is blocked cannot be told from the element's.
@@ -53,7 +48,7 @@ impl KeptSkies {
 pub(super) struct OpenAt<'a> {
     /// Its irradiance, one value per band.
     pub irradiance: [f64; BANDS],
-    /// What the element's irradiance holds of it, mean and gradients.
+    /// Part of it that the element's irradiance holds, mean and gradients.
     pub held: &'a [f64],
     /// Share of the hemisphere that is open, weighed by the cosine.
     pub share: f64,
@@ -140,7 +135,7 @@ impl<'a> Solved<'a> {
     /// weight.
     #[inline]
     pub(super) fn wants_look(&self, weight: f64, variance: f64) -> bool {
-        let most = OPEN_SKY_ERROR_SHARE * self.settings.budget.image;
+        let most = self.settings.budget.open_sky;
         weight * weight * variance > most * most
     }
 
@@ -166,7 +161,7 @@ impl<'a> Solved<'a> {
             return None;
         }
         // whatever the point counts: bands of different weights get the same bits
-        let goal = CIRCLES_ERROR_SHARE * self.settings.budget.image;
+        let goal = self.settings.budget.circles;
         let open = candidates.open(self.scene, self.bvh, surface.point, basis, goal)?;
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));

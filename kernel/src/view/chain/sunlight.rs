@@ -1,4 +1,7 @@
 //! Sunlight on a point that a chain meets: straight, mirrored by flat facets, and in lobes.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors of penumbrae) and `cargo test
+//! --test highlights` (errors of highlights).
 
 use super::occluders::{RayKind, may_meet};
 use super::{Mode, OccluderCache, Path, PathState, RaySample, Solved, Terms};
@@ -19,13 +22,6 @@ const DISC_RAYS: u32 = 16;
 
 /// Most rays toward the sun's disc, in a first set, of a ray that probes ([`RaySample::Probe`]).
 const DISC_RAYS_PROBING: u32 = 4;
-
-/// Largest share of the wanted error that a penumbra may bring by the rays of a first set: half of what is at stake,
-/// times n^-3/4.
-const DISC_ERROR: f64 = 0.25;
-
-/// Error of a penumbra, in wanted errors, above which the pixel is sampled by more rays.
-const PENUMBRA_ERROR_LEAST: f64 = 0.1;
 
 /// Largest factor on [`DISC_RAYS`] where more than the reference radiance is at stake, as in highlights.
 const SUN_RAYS_FACTOR_MOST: f64 = 32.0;
@@ -133,7 +129,7 @@ impl Solved<'_> {
                 let alone = matches!(sample, RaySample::Integrate(_));
                 if alone && count < MOST_DISC_RAYS && error > self.settings.budget.image {
                     goal *= 2;
-                } else if !alone && error > PENUMBRA_ERROR_LEAST * self.settings.budget.image {
+                } else if !alone && error > self.settings.budget.penumbra_pixels {
                     path.sampled = true;
                 } else {
                     path.noise += error;
@@ -148,7 +144,7 @@ impl Solved<'_> {
     fn disc_rays(&self, at_stake: f64, most: u32) -> u32 {
         // what a highlight brings may be many times the reference radiance: an edge across the disc then shows far out
         let most = (f64::from(most) * clamp(at_stake, 1.0, SUN_RAYS_FACTOR_MOST)) as u32;
-        let ratio = 0.5 * at_stake / (DISC_ERROR * self.settings.budget.image);
+        let ratio = 0.5 * at_stake / self.settings.budget.penumbrae;
         (2..most).find(|&n| sqrt(sqrt(f64::from(n * n * n))) >= ratio).unwrap_or(most)
     }
 

@@ -7,7 +7,7 @@ use core::ops::Range;
 /// Numbers of a pixel's centre beside its terms, in the order of [`Number`].
 const CENTRE_NUMBERS: usize = 5;
 
-/// What is stored of a pixel's centre behind its terms.
+/// Numbers of a pixel's centre behind its terms.
 #[derive(Clone, Copy)]
 enum Number {
     /// 1 where the centre's ray met the object.

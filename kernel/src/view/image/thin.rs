@@ -1,4 +1,6 @@
 //! Sheets and wires seen edge on, which stand between pixel centres: found in the mesh, as no centre shows them.
+//!
+//! Constants of this file are measured by `cargo run --release --example calibrate` (errors of thin parts).
 
 use super::Painter;
 use crate::base::index::Index;

@@ -1,4 +1,6 @@
 //! Spans of a line across the object: the nearest facets, and where each begins and ends.
+//!
+//! Constants of this file are measured by `cargo test --test raster` (spans against rays).
 
 use super::{Samples, Triangle, View};
 use crate::base::arena::{Arena, Need, plain_struct};

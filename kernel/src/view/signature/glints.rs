@@ -4,6 +4,8 @@
 //! the observer. A facet is halved until that direction is linear over each part; what the disc takes of a part is then a
 //! chord of a circle on each of some lines across it. Lobes are summed over parts that are small against the angle to the
 //! disc. Whether a point is seen and lit, rays tell.
+//!
+//! Constants of this file are measured by `cargo test --test signature -- --nocapture` (errors of glints).
 
 use super::Sums;
 use crate::base::index::{Index, IndexMut};
@@ -37,10 +39,6 @@ const GLINT_LINES_MOST: u32 = 1024;
 
 /// Largest angle of a part of a facet, over its angle to the disc, at which the lobe is summed by points of the part.
 const LOBE_PART_ANGLE_MOST: f64 = 0.3;
-
-/// Intensity of a part of a facet, in tolerances of the reference radiance over the whole view, below which the part is
-/// halved no more.
-const GLINT_FAINT: f64 = 1e-3;
 
 /// Whether any facet shows the sun apart from the rays through cells.
 pub(super) fn are_wanted(solved: &Solved<'_>) -> bool {
@@ -301,7 +299,7 @@ impl Glints<'_, '_, '_> {
         let solved = self.solved;
         let width = seen.sun.half_angle() + 1.0 / lobe.ratio();
         let scale = self.scale(seen);
-        let faint = GLINT_FAINT * solved.settings.budget.image * self.whole;
+        let faint = solved.settings.budget.glints * self.whole;
         let brings = |value: f64, part: &Part| scale * value * part.share() * seen.area;
         let halves = |this: &mut Self, part: &Part| {
             let Spread { reach, off, .. } = this.spread(seen, part);
