@@ -126,7 +126,7 @@ fn mirrors_that_reflect_less_multiply_rows() {
     for (name, before, tolerance) in kinds([0.5, 0.3, 0.4], [0.0, 0.5, 0.3]) {
         let gloss = before.materials[2].gloss;
         let after = with(&before, &three([0.5, 0.5, 0.4], [0.0, 0.2, 0.1], gloss));
-        let (fates, rays) = updated(&name, &before, &after, &within(tolerance));
+        let (fates, rays) = updated(name, &before, &after, &within(tolerance));
         assert!(fates.rescaled > 0 && fates.redone == 0 && rays == 0, "{name}: {fates:?}");
     }
 }
@@ -136,7 +136,7 @@ fn mirrors_that_reflect_more_redo_rows_whose_chains_were_cut() {
     // one mirror alone cuts no chain, and is multiplied; two cut chains between them
     for (name, before, tolerance) in kinds([0.5, 0.3, 0.4], [0.0, 0.2, 0.0]) {
         let after = with(&before, &three([0.5, 0.3, 0.4], [0.0, 0.6, 0.0], before.materials[2].gloss));
-        let (fates, _) = updated(&name, &before, &after, &within(tolerance));
+        let (fates, _) = updated(name, &before, &after, &within(tolerance));
         assert!(fates.rescaled > 0, "{name}: {fates:?}");
         assert!(name != "corner" || fates.redone == 0, "{name}: {fates:?}");
     }
@@ -153,10 +153,10 @@ fn what_sent_nothing_and_what_begins_to_mirror_is_met_anew() {
         let gloss = before.materials[2].gloss;
         // black facets reflect: rows of their own, and of all that may have met them
         let after = with(&before, &three([0.5, 0.4, 0.4], [0.0, 0.0, 0.2], gloss));
-        let (fates, rays) = updated(&name, &before, &after, &within(tolerance));
+        let (fates, rays) = updated(name, &before, &after, &within(tolerance));
         assert!(fates.redone > 0 && rays > 0, "{name}: {fates:?}");
         let after = with(&before, &three([0.5, 0.0, 0.4], [0.3, 0.0, 0.2], gloss));
-        let (fates, rays) = updated(&name, &before, &after, &within(tolerance));
+        let (fates, rays) = updated(name, &before, &after, &within(tolerance));
         assert!(fates.redone > 0 && rays > 0, "{name}: {fates:?}");
     }
 }

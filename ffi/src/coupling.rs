@@ -554,7 +554,7 @@ pub(crate) mod owned {
         blocks: &[Block<'static>],
         handle: impl FnOnce(&'static [Block<'static>]) -> blik_coupling,
     ) -> Result<*mut blik_coupling, blik_error> {
-        let bytes = head::<blik_coupling>() + blocks.len() * size_of::<Block<'_>>() + ALIGNMENT;
+        let bytes = head::<blik_coupling>() + size_of_val(blocks) + ALIGNMENT;
         let mut front = Slab::new(bytes)?;
         // SAFETY: the handle owns the slab.
         let (place, rest) = place::<blik_coupling>(unsafe { front.bytes_mut() })?;
