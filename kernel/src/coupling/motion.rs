@@ -159,30 +159,47 @@ impl<'a> Motion<'a> {
         if row.row.chain_rays > 0 && self.mirrored.at(own) != 0 {
             return false;
         }
-        let mut rising = self
-            .others(facet)
-            .filter(|part| facets.iter().any(|facet| self.rises(*facet as usize, side, *part)));
+        let rises = |part: &usize| facets.iter().any(|facet| self.rises(*facet as usize, side, *part));
+        let mut rising = self.others(facet).filter(rises);
         // entries in closed form have no rays, and open rows had none
-        let traced = directional && row.row.rays > 0;
-        if traced {
-            rising.all(|part| self.misses(elements, unknown, part, row.row.rays))
-        } else {
-            rising.next().is_none()
+        if !directional || row.row.rays == 0 {
+            return rising.next().is_none();
         }
+        while let Some(first) = rising.next() {
+            let (mut some, mut count) = ([first; PARTS_TOGETHER], 1);
+            for (to, part) in some.iter_mut().skip(1).zip(&mut rising) {
+                (*to, count) = (part, count + 1);
+            }
+            if !self.misses(elements, unknown, (some, count), row.row.rays) {
+                return false;
+            }
+        }
+        true
     }
 
-    /// Whether no ray of a row enters a part's box, before or after.
-    fn misses(&self, elements: &Elements<'_>, unknown: usize, part: usize, rays: u32) -> bool {
+    /// Whether no ray of a row enters the boxes of the first `count` of some parts, before or after.
+    fn misses(
+        &self,
+        elements: &Elements<'_>,
+        unknown: usize,
+        (parts, count): ([usize; PARTS_TOGETHER], usize),
+        rays: u32,
+    ) -> bool {
         let facet = elements.facet_of(unknown).0;
-        let (carry, bounds) = (self.carry(facet, part), self.boxes.at(part));
-        let all = RowRays::new(self.old, elements, unknown);
+        let all = parts.map(|part| (self.carry(facet, part), self.boxes.at(part)));
+        let own = RowRays::new(self.old, elements, unknown);
         (0..rays).all(|number| {
-            let ray = all.ray(self.old, elements, number).0;
-            !enters(&bounds, ray.origin, ray.direction)
-                && !enters(&bounds, carry.point(ray.origin), carry.turn(ray.direction))
+            let ray = own.ray(self.old, elements, number).0;
+            all.iter().take(count).all(|(carry, bounds)| {
+                !enters(bounds, ray.origin, ray.direction)
+                    && !enters(bounds, carry.point(ray.origin), carry.turn(ray.direction))
+            })
         })
     }
 }
+
+/// Parts whose boxes a row's rays are held against together: making a ray costs as much as some of them.
+const PARTS_TOGETHER: usize = 4;
 
 /// Distance from its pose at which a facet's corner still stands there, over the size of the larger scene: above what rotations
 /// known to 1e-6 and meshes far from the origin make of it.
