@@ -160,8 +160,10 @@ fn pixels_are_finite_whatever_the_irradiances_are() {
         {
             solved.settings.rays = rays;
             let camera = Camera::new(&CameraInput { sampling, ..input }, solved.scene).unwrap();
-            let (mut pixels, mut memory) =
-                (vec![f32::NAN; 64], Memory::new(scratch_bytes(&camera, 1).unwrap()));
+            let (mut pixels, mut memory) = (
+                vec![f32::NAN; 64],
+                Memory::new(scratch_bytes(&camera, solved.scene, solved.elements).unwrap()),
+            );
             let mut target = Target { image: &mut pixels, components: [&mut [], &mut [], &mut []] };
             rows(&solved, &camera, 0..8, &mut target, memory.bytes_mut()).unwrap();
             assert!(pixels.iter().all(|p| p.is_finite()) && pixels.contains(&f32::MAX), "{pixels:?}");

@@ -66,7 +66,8 @@ fn intensity(lights: &Lights<'_>, input: &LightInput<'_>) -> Vec<f64> {
     let solution = lights.solve(input, &light, None, memory.bytes_mut()).unwrap();
     let (scene, bvh, elements) = (lights.scene, lights.bvh, lights.elements);
     let settings = lights.settings.chains(0);
-    let solved = blik_kernel::chain::Solved { scene, bvh, elements, light: &light, solution, settings };
+    let rows = blik_kernel::chain::KnownRows::new(lights.coupling);
+    let solved = blik_kernel::chain::Solved { scene, bvh, elements, rows, light: &light, solution, settings };
     let view = signature::View::new(&solved, VIEW, CELLS).unwrap();
     let mut scratch = Memory::new(signature::scratch_bytes().unwrap());
     let sums = signature::whole(&solved, &view, scratch.bytes_mut()).unwrap();

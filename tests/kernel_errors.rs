@@ -354,7 +354,7 @@ fn outputs_of_the_wrong_size() {
             sampling: Sampling::Area,
         };
         let camera = Camera::new(&input, solved.scene).unwrap();
-        let mut scratch = vec![0; image::scratch_bytes(&camera, 1).unwrap()];
+        let mut scratch = vec![0; image::scratch_bytes(&camera, solved.scene, solved.elements).unwrap()];
         let (mut pixels, mut part) = ([7.0f32; 12], [7.0f32; 5]);
         let expected = Error::Length { what: "image", expected: 8, given: 12 };
         let mut target = Target { image: &mut pixels, components: Default::default() };

@@ -65,7 +65,7 @@ fn image_of(lit: &Lit<'_>, system: &System<'_>, radiance: &[f64], camera: &Camer
     let solved = Solved { solution: Solution { irradiance: &irradiance, ..solved.solution }, ..solved };
     let camera = Camera::new(camera, system.scene).unwrap();
     let mut image = vec![0.0; camera.columns() * camera.rows()];
-    let mut scratch = vec![0; scratch_bytes(&camera, 1).unwrap()];
+    let mut scratch = vec![0; scratch_bytes(&camera, solved.scene, solved.elements).unwrap()];
     let mut target = Target { image: &mut image, components: [&mut [], &mut [], &mut []] };
     rows(&solved, &camera, 0..camera.rows(), &mut target, &mut scratch).unwrap();
     image

@@ -253,7 +253,7 @@ fn light_solution_image_and_signature_refuse_tables_of_the_wrong_size() {
         case.with_lit(1, &within(5e-2), |_, lit| {
             let solved = lit.solved();
             let camera = Camera::new(&camera(), solved.scene).unwrap();
-            let bytes = image::scratch_bytes(&camera, 3).unwrap();
+            let bytes = image::scratch_bytes(&camera, solved.scene, solved.elements).unwrap();
             let size = PIXELS * PIXELS * 3;
             let mut scratch = vec![0; bytes];
             wrong("image", size, 7.5f32, |out| {

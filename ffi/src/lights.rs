@@ -9,7 +9,7 @@ use crate::status::*;
 use crate::types::*;
 use crate::view::{Signatures, blik_signature, lane_bytes, measure, wanted_cells, with_scratch};
 use blik_kernel::arena::ALIGNMENT;
-use blik_kernel::chain::Solved;
+use blik_kernel::chain::{KnownRows, Solved};
 use blik_kernel::coupling::Coupling;
 use blik_kernel::facets;
 use blik_kernel::light::{Light, LightInput};
@@ -305,7 +305,8 @@ fn put_light(
     let settings = coupling.settings.asked.chains(coupling.rays);
     let (scene, bvh, elements, solution) = (all.scene, all.bvh, all.elements, *solution);
     let bands = scene.bands();
-    let solved = Solved { scene, bvh, elements, light, solution, settings };
+    let rows = KnownRows::new(all.coupling);
+    let solved = Solved { scene, bvh, elements, rows, light, solution, settings };
     let parts = [0, 1].map(|k| {
         // SAFETY: every light is handed out once, and the arrays have `values` entries for each.
         unsafe { core::slice::from_raw_parts_mut(out.facets[k].at(number * out.values[k]), out.values[k]) }

@@ -7,7 +7,8 @@ use crate::status::*;
 use crate::types::*;
 use crate::{call, caught};
 use blik_kernel::arena::{ALIGNMENT, Arena, Need};
-use blik_kernel::chain::Solved;
+use blik_kernel::chain::{KnownRows, Solved};
+use blik_kernel::coupling::Coupling;
 use blik_kernel::light::{Light, LightInput};
 use blik_kernel::radiosity::solution::Solution;
 use blik_kernel::scene::{MAX_BANDS, Scene};
@@ -71,6 +72,7 @@ impl blik_solution {
             scene: &base.scene,
             bvh: &base.bvh,
             elements: &self.coupling.elements,
+            rows: KnownRows::new(&self.coupling.matrix().unwrap_or(Coupling::part(&[]))),
             light: &self.light,
             solution: self.record,
             settings: settings.asked.chains(self.coupling.rays),

@@ -36,7 +36,7 @@ pub struct blik_tally {
     pub refined_pixels: u64,
     /// Sum over object pixels of the squared expected error from the diffuse solution.
     pub noise_squared: f64,
-    /// Sum over object pixels of the squared expected error from sampling the pixel's area.
+    /// Sum over object pixels of the squared expected error from sampling the pixel's area and lobes.
     pub sampling_squared: f64,
     /// Largest bound on what cut chains could still have brought.
     pub chain_tail: f64,
@@ -122,9 +122,14 @@ unsafe fn camera(camera: *const blik_camera, scene: &Scene<'_>) -> Result<Camera
     Ok(Camera::new(&CameraInput { projection, eye, target, up, columns, rows, sampling }, scene)?)
 }
 
+/// Bytes of the scratch memory for some rows.
+fn rows_bytes(camera: &Camera, solution: &blik_solution) -> Result<usize, blik_error> {
+    Ok(image::scratch_bytes(camera, &solution.coupling.base.scene, &solution.coupling.elements)?)
+}
+
 /// Bytes of one lane's scratch memory, and of the tallies before them.
-fn scratch_parts(camera: &Camera, bands: usize) -> Result<(usize, usize), blik_error> {
-    let lane = image::scratch_bytes(camera, bands)?.next_multiple_of(ALIGNMENT);
+fn scratch_parts(camera: &Camera, solution: &blik_solution) -> Result<(usize, usize), blik_error> {
+    let lane = rows_bytes(camera, solution)?.next_multiple_of(ALIGNMENT);
     let tallies = camera.rows().div_ceil(piece(camera.rows())) * size_of::<Tally>();
     Ok((tallies.next_multiple_of(ALIGNMENT) + ALIGNMENT, lane))
 }
@@ -151,7 +156,7 @@ pub unsafe extern "C" fn blik_image_scratch_size(
         let (solution, runner): (&blik_solution, _) = unsafe { (object(solution)?, Runner::new(run)?) };
         // SAFETY: by the caller's promise.
         let camera = unsafe { self::camera(camera, &solution.coupling.base.scene) }?;
-        let (fixed, lane) = scratch_parts(&camera, solution.record.shape.bands)?;
+        let (fixed, lane) = scratch_parts(&camera, solution)?;
         // SAFETY: not null.
         unsafe { to.write(fixed + lane * runner.lanes()) };
         Ok(())
@@ -253,7 +258,7 @@ pub unsafe extern "C" fn blik_image(
             let out = Out::new((pixels, pixel_count), (components, component_count), expected)?;
             (out, Place::optional(tally)?)
         };
-        let (fixed, lane) = scratch_parts(camera, bands)?;
+        let (fixed, lane) = scratch_parts(camera, solution)?;
         let wanted = fixed + lane * runner.lanes();
         let work = |given: &mut [u8]| paint(solution, camera, &mut out, given, &mut runner);
         // SAFETY: by the caller's promise.
@@ -274,7 +279,7 @@ fn paint(
     runner: &mut Runner,
 ) -> Result<Tally, blik_error> {
     let (rows, bands) = (camera.rows(), solution.record.shape.bands);
-    let (fixed, lane_size) = scratch_parts(camera, bands)?;
+    let (fixed, lane_size) = scratch_parts(camera, solution)?;
     let lanes = scratch.len().saturating_sub(fixed) / lane_size.max(1);
     if lanes == 0 {
         return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(fixed + lane_size, scratch.len()));
@@ -368,7 +373,7 @@ pub unsafe extern "C" fn blik_image_rows(
             (out, Place::optional(tally)?)
         };
         let mut target = Target { image: out.pixels, components: out.components };
-        let wanted = image::scratch_bytes(camera, bands)?;
+        let wanted = rows_bytes(camera, solution)?;
         let mut solved = solution.solved();
         image::prepare(&mut solved, camera);
         let work = |given: &mut [u8]| Ok(image::prepared_rows(&solved, camera, range, &mut target, given)?);

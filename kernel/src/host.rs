@@ -37,7 +37,7 @@ use crate::scene::{Scene, SceneInput};
 use crate::settings;
 use crate::stages::{self, Beams, BlockMemory, BlockPlace, CouplingRows, Executor, Lighting, Sizes};
 use crate::view::camera::{Camera, CameraInput};
-use crate::view::chain::Solved;
+use crate::view::chain::{KnownRows, Solved};
 use crate::view::facets;
 use crate::view::image::{self, Tally, Target};
 use crate::view::signature::{self, Signature, Sums, View};
@@ -452,7 +452,7 @@ impl Host {
         let (rows, bands) = (camera.rows(), solved.shape.bands);
         let piece = image::piece(rows);
         let chunk = piece * camera.columns() * bands;
-        let scratch = image::scratch_bytes(camera, bands)?;
+        let scratch = image::scratch_bytes(camera, solved.scene, solved.elements)?;
         let mut parts = terms.each_mut().map(|t| t.chunks_mut(chunk));
         let mut jobs = Vec::new();
         for (i, image) in pixels.chunks_mut(chunk).enumerate() {
@@ -542,7 +542,8 @@ impl Lit<'_> {
     pub fn solved(&self) -> Solved<'_> {
         let Geometry { scene, bvh, elements, settings, rays, .. } = self.geometry;
         let (light, solution, settings) = (&self.light, self.solution(), settings.chains(*rays));
-        Solved { scene, bvh, elements, light, solution, settings }
+        let rows = KnownRows::new(&self.geometry.coupling().unwrap_or(Coupling::part(&[])));
+        Solved { scene, bvh, elements, rows, light, solution, settings }
     }
 
     /// The record of the solution.

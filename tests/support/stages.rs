@@ -9,7 +9,7 @@ use blik_kernel::Error;
 use blik_kernel::arena::{Arena, Memory};
 use blik_kernel::bvh::Bvh;
 use blik_kernel::camera::{Camera, CameraInput};
-use blik_kernel::chain::Solved;
+use blik_kernel::chain::{KnownRows, Solved};
 use blik_kernel::coupling::{Block, Coupling};
 use blik_kernel::element::Elements;
 use blik_kernel::image::{self, Tally, Target};
@@ -270,7 +270,9 @@ pub fn run(
     let solution = lighting.solve(memory, &mut scratch, counts.sun + counts.beams, &mut run)?;
     counts.sweeps = solution.numbers.sweeps as u32;
     let settings = asked.chains(coupling.rays());
-    let solved = Solved { scene: &scene, bvh: &bvh, elements: &elements, light: &light, solution, settings };
+    let rows = KnownRows::new(&coupling);
+    let solved =
+        Solved { scene: &scene, bvh: &bvh, elements: &elements, rows, light: &light, solution, settings };
     view(&solved, parts, camera, &mut work.view, &mut counts)?;
     *used = note(&solution, bits);
     Ok(counts)
@@ -286,7 +288,7 @@ fn view(
 ) -> Result<(), Error> {
     let bands = solved.shape.bands;
     let camera = Camera::new(camera, solved.scene)?;
-    let bytes = image::scratch_bytes(&camera, bands)?;
+    let bytes = image::scratch_bytes(&camera, solved.scene, solved.elements)?;
     let scratch = &mut out.scratch[..bytes];
     let stride = camera.columns() * bands;
     let [first, second, third] = &mut out.terms;

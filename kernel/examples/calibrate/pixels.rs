@@ -39,7 +39,8 @@ pub fn compare(lit: &Lit<'_>, input: &CameraInput, rays: u32) -> Result<Sampled,
     let camera = Camera::new(input, solved.scene)?;
     let bands = solved.shape.bands;
     let (rows, columns) = (camera.rows(), camera.columns());
-    let mut scratch = blik_kernel::arena::Memory::new(image::scratch_bytes(&camera, bands)?);
+    let mut scratch =
+        blik_kernel::arena::Memory::new(image::scratch_bytes(&camera, solved.scene, solved.elements)?);
     let mut pixels = vec![0f32; rows * columns * bands];
     let mut target = Target { image: &mut pixels, components: [&mut [], &mut [], &mut []] };
     let start = std::time::Instant::now();

@@ -8,7 +8,7 @@ use crate::coupling::Coupling;
 use crate::scene::light::{Light, LightInput};
 use crate::settings;
 use crate::stages::{Explained, Lights};
-use crate::view::chain::Solved;
+use crate::view::chain::{KnownRows, Solved};
 use crate::view::importance::Importance;
 use crate::view::signature::{self, View};
 use crate::view::{facets, signature::Sums};
@@ -184,7 +184,8 @@ impl Lights<'_> {
                 Ok(solution) => {
                     let (scene, bvh, elements) = (self.scene, self.bvh, self.elements);
                     let settings = self.settings.chains(geometry.rays);
-                    let solved = Solved { scene, bvh, elements, light: &light, solution, settings };
+                    let rows = KnownRows::new(self.coupling);
+                    let solved = Solved { scene, bvh, elements, rows, light: &light, solution, settings };
                     let cells = settings::signature_cells(&self.settings.budget);
                     return report(&solved, self.coupling, wanted, cells, lane.view.bytes_mut());
                 }

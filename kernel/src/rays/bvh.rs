@@ -244,6 +244,11 @@ impl<'m> Bvh<'m> {
         }
     }
 
+    /// As [`closest`](Bvh::closest), and calls `visit` with every hit, in any order: 64 at most.
+    pub(crate) fn crossings(&self, ray: &Ray, visit: impl FnMut(&Hit)) -> Option<Hit> {
+        traverse::crossings(self, ray, visit)
+    }
+
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.
     pub fn occluded(&self, ray: &Ray) -> bool {
         match &self.external {

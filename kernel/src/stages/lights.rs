@@ -19,7 +19,7 @@ use crate::scene::sky::SkyInput;
 use crate::scene::sky::record::SkyRecord;
 use crate::scene::{MAX_BANDS, Scene};
 use crate::settings::{self, Settings};
-use crate::view::chain::{ChainSettings, Solved};
+use crate::view::chain::{ChainSettings, KnownRows, Solved};
 use crate::view::importance::Importance;
 use crate::view::signature::{self, Sums, View};
 
@@ -276,7 +276,8 @@ impl Lights<'_> {
         let (solution, mut scratch) = self.solve_in((input, light), given, sizes, arena)?;
         let Lights { scene, bvh, elements, coupling, settings } = *self;
         let lighting = Lighting { scene, bvh, elements, coupling, light, settings };
-        let solved = &Solved { scene, bvh, elements, light, solution, settings: chains };
+        let rows = KnownRows::new(coupling);
+        let solved = &Solved { scene, bvh, elements, rows, light, solution, settings: chains };
         for (number, forward) in views.iter().enumerate() {
             let view = (Vec3::from_array(*forward), cells);
             let memory = [&mut *first, &mut *second, &mut *scratch_memory];

@@ -14,7 +14,7 @@ pub enum Limit {
     Nothing,
     /// Rays and elements of the diffuse solution.
     Visibility,
-    /// Rays through pixels.
+    /// Rays through pixels and of lobes.
     Sampling,
     /// The sweeps that were not done.
     Solver,
@@ -41,7 +41,7 @@ impl Limit {
 /// square over few pixels scatters. Measured by `cargo run --release --example calibrate`.
 const FEW_PIXELS_FACTOR: f64 = 8.0;
 
-/// Factor on the expected error of sampling pixels: the 95 % quantile of the true error over it. Measured by `cargo run
+/// Factor on the expected error of sampling pixels and lobes: the 95 % quantile of the true error over it. Measured by `cargo run
 /// --release --example calibrate`.
 const SAMPLING_CAUTION: f64 = 1.25;
 

@@ -14,12 +14,13 @@ use crate::base::error::{Error, Field};
 use crate::base::index::{Index, IndexMut, copy, pieces};
 use crate::base::math::{clamp, fabs, floor, narrow, pow, sqrt};
 use crate::base::qmc::{Sequence, hash2};
+use crate::coupling::element::Elements;
 use crate::rays::bvh::AnswerBuffer;
 use crate::rays::outline::Candidates;
 use crate::rays::ray::{Hit, Line, Ray};
-use crate::scene::MAX_BANDS;
+use crate::scene::{MAX_BANDS, Scene};
 use crate::view::camera::{Camera, Sampling};
-use crate::view::chain::{ChainScratch, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
+use crate::view::chain::{ChainScratch, Fronts, OccluderCache, Occluders, Path, RaySample, Solved, Terms};
 use crate::view::raster::{Items, NO_FACET_DRAWN, UNSURE};
 use centres::Centres;
 use core::ops::Range;
@@ -38,7 +39,7 @@ pub struct Tally {
     pub refined: u64,
     /// Sum over object pixels of the squared expected error from the diffuse solution.
     pub noise2: f64,
-    /// Sum over object pixels of the squared expected error from sampling the pixel's area.
+    /// Sum over object pixels of the squared expected error from sampling the pixel's area and lobes.
     pub sampling2: f64,
     /// Largest bound on what cut chains could still have brought.
     pub tail: f64,
@@ -78,11 +79,13 @@ pub struct Target<'o> {
 
 /// Bytes of scratch memory for [`rows`]: three rows of pixel centres, what integrals over a pixel hold, and the facets
 /// that some rows of centres meet.
-pub fn scratch_bytes(camera: &Camera, bands: usize) -> Result<usize, Error> {
+pub fn scratch_bytes(camera: &Camera, scene: &Scene<'_>, elements: &Elements<'_>) -> Result<usize, Error> {
+    let bands = scene.bands();
     let width = camera.columns() + 2;
     let need = Need::new().and::<f64>(Centres::size(camera.columns(), bands)).and::<f64>(work(bands));
     let need = need.and::<PixelScratch>(1).and::<Occluders>(OccluderCache::ROOM);
-    Candidates::need(Items::need(need, width, ROWS_DRAWN), CANDIDATE_FACETS_KEPT).bytes()
+    let need = Candidates::need(Items::need(need, width, ROWS_DRAWN), CANDIDATE_FACETS_KEPT);
+    Fronts::need(need, elements.unknowns(), bands).bytes()
 }
 
 /// Rows of one piece of an image of `rows` rows: few enough to balance threads, enough to be drawn together. It does
@@ -305,7 +308,8 @@ impl<'a, 's> Painter<'a, 's> {
         scratch: &'s mut [u8],
     ) -> Result<Painter<'a, 's>, Error> {
         let bands = solved.shape.bands;
-        let mut arena = Arena::new(scratch, scratch_bytes(camera, bands)?)?;
+        let elements = solved.elements;
+        let mut arena = Arena::new(scratch, scratch_bytes(camera, solved.scene, elements)?)?;
         let area = camera.sampling() == Sampling::Area;
         let size = if area { Centres::size(camera.columns(), bands) } else { 0 };
         let centre_rows = Centres::new(arena.take::<f64>(size)?, camera.columns(), bands);
@@ -316,6 +320,7 @@ impl<'a, 's> Painter<'a, 's> {
         let lists = arena.take::<Occluders>(OccluderCache::ROOM)?;
         let items = Items::new(&mut arena, camera.columns() + 2, ROWS_DRAWN)?;
         let candidates = Candidates::new(&mut arena, CANDIDATE_FACETS_KEPT)?;
+        let fronts = Fronts::new(&mut arena, elements.unknowns(), bands)?;
         let own = solved.bvh.is_own();
         let few = solved.scene.facets() / DRAWN_FACETS_PER_PIXEL <= camera.columns() * camera.rows();
         let last = end as isize + isize::from(area);
@@ -332,7 +337,7 @@ impl<'a, 's> Painter<'a, 's> {
             pixel,
             beside: false,
             primary: Primary { items, draws: own && few, drawn: 0..0, last, line: None },
-            occluders: occluders.with_candidates(candidates),
+            occluders: occluders.with(candidates, fronts),
             tally: Tally::default(),
         })
     }
@@ -353,7 +358,7 @@ impl<'a, 's> Painter<'a, 's> {
         let columns = self.camera.columns();
         for (i, row) in range.enumerate() {
             self.line(row as isize, 0..columns as isize, |this, pixels, path| {
-                this.count_pixel(path.object, path.variance + path.noise * path.noise, path.tail);
+                this.count_pixel(path.object, [path.variance, path.noise * path.noise], path.tail);
                 let terms = this.terms();
                 let first = i * columns + pixels.start as usize;
                 put(target, this.solved.shape.bands, first..first + pixels.len(), 1.0, |term, band| {
@@ -380,9 +385,9 @@ impl<'a, 's> Painter<'a, 's> {
             for j in 0..columns {
                 let at = self.centre_rows.place(row, j);
                 let centres = &self.centre_rows;
-                let (object, variance, tail) =
-                    (centres.is_object(at), centres.variance(at), centres.tail(at));
-                self.count_pixel(object, variance, tail);
+                let errors = [centres.variance(at), centres.noise(at)];
+                let (object, tail) = (centres.is_object(at), centres.tail(at));
+                self.count_pixel(object, errors, tail);
                 if self.is_flat(at) && !beside {
                     self.write(target, index(j), at);
                     continue;
@@ -552,10 +557,11 @@ impl<'a, 's> Painter<'a, 's> {
     }
 
     /// Counts an object pixel and its expected errors.
-    fn count_pixel(&mut self, object: bool, variance: f64, tail: f64) {
+    fn count_pixel(&mut self, object: bool, [solution, lobes]: [f64; 2], tail: f64) {
         if object {
             self.tally.object_pixels += 1;
-            self.tally.noise2 += variance;
+            self.tally.noise2 += solution;
+            self.tally.sampling2 += lobes;
             self.tally.tail = self.tally.tail.max(tail);
         }
     }

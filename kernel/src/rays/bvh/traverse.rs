@@ -20,7 +20,8 @@
 #[cfg(not(target_pointer_width = "32"))]
 use super::STACK;
 #[cfg(target_pointer_width = "32")]
-use super::path_stack::{self, PathStack};
+use super::path_stack::PathStack;
+use super::path_stack::{self, EMPTY_STACK};
 use super::{Boxes, Bvh, LEAF_CHILD, NO_LANE_FACET, PACKET_LANES, PAIR, Packet, Slack};
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::Vec3;
@@ -64,6 +65,65 @@ pub(super) fn occluded(bvh: &Bvh, ray: &Ray) -> bool {
 /// The first hit, or, where `any` will do, the one that is found first.
 fn search(bvh: &Bvh, ray: &Ray, any: bool) -> Option<Hit> {
     if is_short(bvh) { search_short(bvh, ray, any) } else { search_deep(bvh, ray, any) }
+}
+
+/// See [`Bvh::crossings`].
+pub(super) fn crossings(bvh: &Bvh, ray: &Ray, visit: impl FnMut(&Hit)) -> Option<Hit> {
+    simd::run_lanes(bvh.isa, Crossings { bvh, ray, visit })
+}
+
+/// Most hits of one ray that [`Bvh::crossings`] tells of.
+const CROSSINGS_TOLD_MOST: usize = 64;
+
+/// The search for all hits.
+struct Crossings<'a, F> {
+    bvh: &'a Bvh<'a>,
+    ray: &'a Ray,
+    visit: F,
+}
+
+impl<F: FnMut(&Hit)> LaneTask for Crossings<'_, F> {
+    type Out = Option<Hit>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, lanes: L) -> Option<Hit> {
+        let (bvh, ray) = (self.bvh, self.ray);
+        let mut walk = TraversalRay::new(bvh, ray)?;
+        let line = Line::new(ray)?;
+        let beam = LaneRay::new(lanes, &walk);
+        let (mut stack, mut depth) = (EMPTY_STACK, 0);
+        // leaves that share a packet show its facets twice
+        let (mut seen, mut count) = ([0; CROSSINGS_TOLD_MOST], 0);
+        let mut best = None;
+        let mut next = 0;
+        loop {
+            if next & LEAF_CHILD == 0 {
+                let (near, far) = beam.slabs(bvh.boxes.get(next as usize)?, walk.limit);
+                path_stack::push(&mut stack, &mut depth, next, lanes.le8(near, far));
+            } else {
+                let first = (next & !(LEAF_CHILD | PAIR)) as usize;
+                for index in first..=first + usize::from(next & PAIR != 0) {
+                    let Some(packet) = bvh.lanes(index) else { return best };
+                    let mut set = beam.inside(packet);
+                    while set != 0 {
+                        let facet = packet.2[set.trailing_zeros() as usize & 7];
+                        set &= set - 1;
+                        let Some(hit) = bvh.meet(&line, ray, facet) else { continue };
+                        if count < CROSSINGS_TOLD_MOST && !seen.head(count).contains(&facet) {
+                            seen.set(count, facet);
+                            count += 1;
+                            (self.visit)(&hit);
+                        }
+                        walk.first.note(hit, &mut best);
+                    }
+                }
+            }
+            let Some((node, left)) = path_stack::top(&mut stack, &mut depth) else { return best };
+            let child = left.ilog2() as usize & 7;
+            *left &= !(1 << child);
+            next = bvh.children.get(*node as usize)?[child];
+        }
+    }
 }
 
 /// Search with the short stack. Not inlined: the frame of deep trees' search stays free of it.
@@ -162,7 +222,7 @@ impl<const N: usize> Stack for [u64; N] {
 /// takes a seventh of the memory of children with distances.
 #[cfg(target_pointer_width = "32")]
 impl Stack for PathStack {
-    const EMPTY: Self = path_stack::EMPTY_STACK;
+    const EMPTY: Self = EMPTY_STACK;
 
     #[inline(always)]
     fn push_children(
@@ -505,4 +565,48 @@ fn entry(bvh: &Bvh, origin: Vec3, inverse: Vec3, pad: f64) -> Option<f64> {
     let far = (a.max(b) + margin).min_element();
     let start = if near > 0.0 { near } else { 0.0 };
     (start <= far).then_some(start)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::base::qmc::Sequence;
+    use crate::base::simd::Isa;
+    use crate::rays::ray::intersect;
+    use std::vec::Vec;
+
+    #[test]
+    fn crossings_are_all_hits_and_their_first() {
+        let (points, rays) = (Sequence::new(3), Sequence::new(4));
+        let place = |sequence: Sequence, n: u32| {
+            let ((x, y), (z, _)) = (sequence.pair(n, 0), sequence.pair(n, 2));
+            Vec3::new(x - 0.5, y - 0.5, z - 0.5)
+        };
+        // small ones, so that leaves share packets
+        let corners: Vec<[Vec3; 3]> = (0..500)
+            .map(|n| [0, 1, 2].map(|k| place(points, n) + 0.4 * place(points, 1000 + 3 * n + k)))
+            .collect();
+        let areas = std::vec![1.0; corners.len()];
+        for isa in Isa::all() {
+            let mut memory = std::vec![0; Bvh::bytes(corners.len()).unwrap()];
+            let bvh = Bvh::build(&corners, &areas, isa, &mut memory).unwrap();
+            let mut most = 0;
+            for n in 0..300 {
+                let direction = place(rays, 1000 + n).normalize();
+                let ray = Ray { skip: n, ..Ray::new(place(rays, n), direction) };
+                let mut found = Vec::new();
+                let first = bvh.crossings(&ray, |hit| found.push(*hit));
+                found.sort_by_key(|hit| hit.facet);
+                let all = corners.iter().enumerate();
+                let want: Vec<Hit> =
+                    all.filter_map(|(f, corners)| intersect(&ray, f as u32, corners)).collect();
+                assert_eq!(found, want);
+                assert_eq!(first, bvh.closest(&ray));
+                most = most.max(found.len());
+            }
+            assert!(most > 4, "{most}");
+        }
+    }
 }

@@ -13,13 +13,15 @@
 //!
 //! Constants of this file are measured by `cargo run --release --example calibrate` (errors beside estimates).
 
+use super::fronts::{Facing, Fronts};
 use super::straight::KeptSkies;
-use super::{DetailCache, Mode, OpenAt, Path, PathState, RaySample, SIGNS, Solved, Terms, held};
+use super::{DetailCache, Mode, OpenAt, Path, PathState, RaySample, SIGNS, Solved, Terms, held, sign};
 use crate::base::arena::plain_table;
 use crate::base::index::{Index, IndexMut};
-use crate::base::math::{PI, Vec3, clamp, frame, pow, sqrt};
+use crate::base::math::{PI, Vec3, clamp, fabs, frame, pow, sqrt};
 use crate::base::qmc::{Sequence, cosine_direction, hash2};
 use crate::coupling::element::Local;
+use crate::radiosity::straight::BLOCKED_ROUNDING;
 use crate::rays::ray::Ray;
 use crate::rays::surface::Surface;
 use crate::scene::{MAX_BANDS, Scene};
@@ -55,13 +57,16 @@ const GATHER_RAYS_FACTOR_MOST: f64 = 4.0;
 /// mean.
 const GATHER_SETS: usize = 8;
 
+/// Least share of the wanted error of a point that is left to rays: where elements leave more than all, only finer ones help.
+const GATHER_GOAL_SHARE_LEAST: f64 = 0.8;
+
 /// Largest axis ratio of lobes in a scene in whose reflected sunlight points still gather: what narrower lobes reflect
 /// of the sun, few rays meet.
 const GATHER_LOBE_RATIO_MOST: f64 = 20.0;
 
 /// Factor on the squared error that the differences between the [`GATHER_SETS`] tell. They underestimate it where a
 /// small bright or dark object is met by few rays. Measured by `cargo run --release --example calibrate`.
-const GATHER_ERROR_FACTOR2: f64 = 2.4;
+const GATHER_ERROR_FACTOR2: f64 = 3.4;
 
 /// Variance of the mean that independent sets would have by their differences, over that of the stratified sets: the
 /// root of [`GATHER_SETS`] where errors go with n^-3/4.
@@ -72,6 +77,10 @@ const GATHER_STRATIFIED: f64 = 2.83;
 /// Largest ratio of the root of an element's area to the length of the ray that meets it, at which its linear function
 /// is used; above it the ray goes on diffusely.
 const ONWARD_SIZE_MOST: f64 = 1.0;
+
+/// Expected error of an element's radiance from which on rays go on from it, in wanted errors of the image's irradiance over
+/// pi. Measured by `cargo run --release --example calibrate`.
+const ONWARD_ERROR_LEAST: f64 = 1.0;
 
 /// Most times that a ray goes on diffusely: in a corner half of the light does each time.
 const MOST_ONWARD: u32 = 8;
@@ -114,6 +123,20 @@ plain_table! {
         pub unknowns: [u64; PIXEL_ELEMENTS_KEPT],
         /// Sums of the expected errors of what the rays met, with each set of signs.
         pub carried: [f64; SIGNS],
+        /// Sums over the rays of each set: 1 where a ray met something, less the elements with closed forms that it crossed.
+        pub counts: [f64; GATHER_SETS],
+        /// What that is on the mean, which is known without rays: the blocked share less what those elements would fill.
+        pub balance: f64,
+        /// Whether it is known.
+        pub balanced: u64,
+        /// Radiance of what rays meet, summed over them; and where none does, what the element expects of it.
+        pub met: [f64; BANDS],
+        pub usual: [f64; BANDS],
+        /// What the elements that face the point bring it, irradiance over pi, where closed forms are used
+        /// ([`Gathered::closed`]).
+        pub known: [f64; BANDS],
+        /// Whether they are: then rays find the difference.
+        pub closed: u64,
         /// Rays that met something.
         pub hits: u64,
         /// How many there are.
@@ -138,6 +161,13 @@ impl Gathered {
         errors: [0.0; PIXEL_ELEMENTS_KEPT],
         unknowns: [0; PIXEL_ELEMENTS_KEPT],
         carried: [0.0; SIGNS],
+        counts: [0.0; GATHER_SETS],
+        balance: 0.0,
+        balanced: 0,
+        met: [0.0; BANDS],
+        usual: [0.0; BANDS],
+        known: [0.0; BANDS],
+        closed: 0,
         hits: 0,
         count: 0,
         skies: KeptSkies::ZERO,
@@ -167,18 +197,28 @@ impl Gathered {
         find(&self.unknowns, self.count, unknown)
     }
 
+    /// Mean radiance of what rays meet: what they miss or meet too often of the blocked share has it, too.
+    fn level(&self, band: usize) -> f64 {
+        match (self.balanced, self.hits) {
+            (0, _) => 0.0,
+            (_, 0) => self.usual.at(band),
+            (_, hits) => self.met.at(band) / hits as f64,
+        }
+    }
+
     /// Mean of one band over all of `rays` rays, with the exact sky or with theirs, and the square of its expected error.
     fn mean(&self, band: usize, rays: u32, exact: bool) -> (f64, f64) {
         let each = f64::from(rays) / GATHER_SETS as f64;
-        let open = if exact { 0.0 } else { 1.0 };
+        let (open, level) = (if exact { 0.0 } else { 1.0 }, self.level(band));
         let of = |part: usize| {
             let [beyond, open_sky] =
                 [&self.beyond, &self.open].map(|sums| sums.get(part).map_or(0.0, |p| p.at(band)));
-            (beyond + open * open_sky) / each
+            (beyond + open * open_sky - level * self.counts.at(part)) / each
         };
         let mean = (0..GATHER_SETS).map(of).sum::<f64>() / GATHER_SETS as f64;
         let squares = (0..GATHER_SETS).map(|part| (of(part) - mean) * (of(part) - mean)).sum::<f64>();
-        (mean, squares / (GATHER_STRATIFIED * (GATHER_SETS * (GATHER_SETS - 1)) as f64))
+        let variance = squares / (GATHER_STRATIFIED * (GATHER_SETS * (GATHER_SETS - 1)) as f64);
+        (mean + level * self.balance + self.known.at(band), variance)
     }
 
     /// The square of the expected error of all bands, relative to the reference, the largest.
@@ -196,6 +236,10 @@ impl Gathered {
                 let to = sums.get_mut(part).into_iter().flatten();
                 to.zip(a.iter().zip(&b)).for_each(|(to, (a, b))| *to = a + b);
             }
+        }
+        for part in 0..GATHER_SETS {
+            let [a, b] = [2 * part, 2 * part + 1].map(|from| self.counts.get(from).copied().unwrap_or(0.0));
+            self.counts.set(part, a + b);
         }
     }
 }
@@ -224,6 +268,16 @@ const SUNLIT_SPREAD: f64 = 2.5;
 /// [`RAY_SPREAD_MOST`].
 const LEAST_VARIED: f64 = 0.3;
 
+/// Largest radiance that what is met is expected to have on the mean, relative to the reference radiance: the sun's disc,
+/// lamps and highlights are far brighter, and fill little.
+const USUAL_MOST: f64 = 2.0;
+
+/// Radiance that is expected of what an element has not met, over the largest that is.
+const NOTHING_KNOWN: f64 = 0.15;
+
+/// Standard deviation of the radiance met over its mean, on the scale of [`RAY_SPREAD_MOST`].
+const RADIANCE_VARIED: f64 = 0.8;
+
 /// Standard deviation of a ray over that where half of a hemisphere is bright, for this irradiance over pi of what is
 /// met: of three tenths of the hemisphere.
 pub(super) fn spread(reflected: f64) -> f64 {
@@ -240,6 +294,8 @@ pub(super) struct Onward<'w> {
     bounces: u32,
     /// How often it went on before.
     depth: u32,
+    /// Expected error of an element's radiance up to which its linear function serves, relative to the reference radiance.
+    most: f64,
 }
 
 /// A point at which the irradiance is gathered.
@@ -345,14 +401,20 @@ impl Solved<'_> {
         let sequence = Sequence::new(seed);
         let axes = frame(gather_point.surface.normal);
         let tolerance = self.settings.budget.image / gather_point.weight;
-        let goal = self.settings.budget.gathering_rays * tolerance;
-        let goal = goal * goal;
         let fewest = if gather_point.open.is_some() { GATHER_RAYS_FEWEST } else { GATHER_SKY_RAYS_FEWEST };
-        let least = clamp(
-            GATHER_RAYS_FACTOR_LEAST * usual_rays(tolerance / self.spread_at(gather_point)),
-            fewest,
-            GATHER_RAYS_MOST,
-        );
+        let least = |facing: Option<&Facing>| {
+            let rays = usual_rays(tolerance / self.spread_at(gather_point, facing));
+            clamp(GATHER_RAYS_FACTOR_LEAST * rays, fewest, GATHER_RAYS_MOST)
+        };
+        let facing = self.facing(gather_point, least(None), &mut mode.occluders.fronts);
+        self.expect(gather_point, facing.as_ref(), gathered);
+        // what the elements that the point sees leave is none of the rays' business
+        let all = self.settings.budget.gathering_rays * tolerance;
+        let all = all * all;
+        let least_goal = GATHER_GOAL_SHARE_LEAST * GATHER_GOAL_SHARE_LEAST * all;
+        let goal = (all - facing.as_ref().map_or(0.0, |facing| carried(facing.signed))).max(least_goal)
+            / GATHER_ERROR_FACTOR2;
+        let least = least(facing.as_ref());
         let most = clamp(GATHER_RAYS_FACTOR_MOST * usual_rays(tolerance), fewest, GATHER_RAYS_MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
         gathered.sky.fill(0.0);
@@ -373,6 +435,10 @@ impl Solved<'_> {
             }
             let [exact, plain] = [true, false].map(|exact| gathered.error(self.reference, rays, exact));
             if exact.min(plain) <= goal || 2 * rays > most {
+                if let Some(facing) = &facing {
+                    let signed = gathered.carried.iter_mut().zip(facing.signed);
+                    signed.for_each(|(sum, error)| *sum += f64::from(rays) * error);
+                }
                 return Some((exact <= plain, rays));
             }
             gathered.halve();
@@ -380,19 +446,58 @@ impl Solved<'_> {
         }
     }
 
+    /// What all elements bring the point by closed forms, where that costs less than `rays` rays.
+    fn facing(&self, gather_point: &GatherPoint<'_>, rays: f64, fronts: &mut Fronts<'_>) -> Option<Facing> {
+        if !self.bvh.is_own() {
+            return None;
+        }
+        let elements = fronts.of(self, gather_point.unknown, rays)?;
+        let Surface { point, normal, .. } = *gather_point.surface;
+        Some(elements.facing(self.bvh.isa(), (point, normal), self.shape.bands))
+    }
+
+    /// Mean radiance of what is met, by the element's linear function.
+    fn usual(&self, gather_point: &GatherPoint<'_>, band: usize) -> f64 {
+        let GatherPoint { values, local, open, .. } = *gather_point;
+        let brightest = self.numbers.brightest.min(USUAL_MOST) * self.reference.at(band);
+        let filled = open.map_or(1.0, |open| open.ratio * open.by_element);
+        if filled < BLOCKED_ROUNDING {
+            return NOTHING_KNOWN * brightest;
+        }
+        brightest.min(held(values, self.shape.bands, local, open, band) / (PI * filled))
+    }
+
+    /// Notes what is known without rays.
+    fn expect(&self, gather_point: &GatherPoint<'_>, facing: Option<&Facing>, gathered: &mut Gathered) {
+        gathered.closed = u64::from(facing.is_some());
+        gathered.balanced = u64::from(gather_point.open.is_some());
+        let blocked = gather_point.open.map_or(0.0, |open| 1.0 - open.share);
+        gathered.balance = blocked - facing.map_or(0.0, |facing| facing.share);
+        gathered.known = facing.map_or([0.0; BANDS], |facing| facing.light);
+        for band in 0..self.shape.bands {
+            gathered.usual.set(band, self.usual(gather_point, band));
+        }
+        (gathered.counts, gathered.met) = ([0.0; GATHER_SETS], [0.0; BANDS]);
+    }
+
     /// Standard deviation of a ray from a point over that where half of a hemisphere is bright: where the straight sky is
     /// known, of what is met, which the element tells about, whether it is met or not.
-    fn spread_at(&self, gather_point: &GatherPoint<'_>) -> f64 {
-        let Some(open) = gather_point.open else { return RAY_SPREAD_MOST };
-        let (bands, blocked) = (self.shape.bands, (1.0 - open.share).max(f64::MIN_POSITIVE));
+    fn spread_at(&self, gather_point: &GatherPoint<'_>, facing: Option<&Facing>) -> f64 {
+        let blocked = match (gather_point.open, facing) {
+            (Some(open), _) => 1.0 - open.share,
+            // without a sky nothing arrives but from what is met
+            (None, Some(_)) if self.light.sky.is_none() => 1.0,
+            _ => return RAY_SPREAD_MOST,
+        };
         let of = |(band, reference): (usize, &f64)| {
-            let met = held(gather_point.values, bands, gather_point.local, gather_point.open, band)
-                / (PI * blocked);
-            if *reference > 0.0 { met / reference } else { 0.0 }
+            if *reference > 0.0 { self.usual(gather_point, band) / reference } else { 0.0 }
         };
         let met = self.reference.iter().enumerate().map(of).fold(0.0, f64::max);
         let met = if self.light.sun.is_some() { SUNLIT_SPREAD * met } else { met };
-        let chance = 2.0 * sqrt(blocked * open.share.max(0.0));
+        let chance = match facing {
+            Some(facing) => RADIANCE_VARIED * sqrt(fabs(facing.share - blocked)),
+            None => (2.0 * sqrt((blocked * (1.0 - blocked)).max(0.0))).min(RADIANCE_VARIED * sqrt(blocked)),
+        };
         clamp(met * chance.max(LEAST_VARIED * blocked), RAY_SPREAD_LEAST, RAY_SPREAD_MOST)
     }
 
@@ -408,12 +513,25 @@ impl Solved<'_> {
     ) -> Option<()> {
         let bands = self.shape.bands;
         let ray = gather_point.surface.spawn_ray(direction);
-        let mut hit = self.bvh.closest(&ray);
         path.rays += 1;
-        let Gathered { terms, throughput, onward, sky, beyond, open, carried, hits, .. } = gathered;
+        let Gathered {
+            terms, throughput, onward, sky, beyond, open, carried, hits, counts, met, closed, ..
+        } = gathered;
         let (terms, throughput, onward_throughput) =
             (terms.first_mut()?, throughput.first_mut()?, onward.first_mut()?);
-        let (beyond, open) = (beyond.get_mut(part)?, open.get_mut(part)?);
+        let (beyond, open, count) = (beyond.get_mut(part)?, open.get_mut(part)?, counts.get_mut(part)?);
+        let fronts = mode.occluders.fronts.latest().filter(|_| *closed > 0);
+        let mut hit = if let Some(fronts) = fronts {
+            self.bvh.crossings(&ray, |hit| {
+                let Some((unknown, values)) = fronts.crossed(self, hit) else { return };
+                beyond.iter_mut().zip(values).take(bands).for_each(|(sum, light)| *sum -= light);
+                *count -= 1.0;
+                let signed = carried.iter_mut().enumerate();
+                signed.for_each(|(set, sum)| *sum -= sign(unknown, set) * values.at(bands));
+            })
+        } else {
+            self.bvh.closest(&ray)
+        };
         if let (None, Some(light)) = (gather_point.open, &self.light.sky) {
             light.radiance(direction, sky.head_mut(bands));
             open.iter_mut().zip(&*sky).take(bands).for_each(|(sum, l)| *sum += l);
@@ -422,8 +540,10 @@ impl Solved<'_> {
             return Some(());
         }
         *hits += 1;
+        *count += 1.0;
         terms.clear(bands);
         throughput.head_mut(bands).fill(1.0);
+        let most = ONWARD_ERROR_LEAST * self.settings.budget.image / gather_point.weight;
         let mut state = PathState {
             ray,
             throughput,
@@ -436,7 +556,7 @@ impl Solved<'_> {
             images,
             gathered: None,
             step: 0.0,
-            onward: Some(Onward { throughput: onward_throughput, ray: None, bounces: 0, depth: 0 }),
+            onward: Some(Onward { throughput: onward_throughput, ray: None, bounces: 0, depth: 0, most }),
         };
         let mut inner = Path::default();
         loop {
@@ -452,7 +572,9 @@ impl Solved<'_> {
         path.rays += inner.rays;
         carried.iter_mut().zip(inner.signed).for_each(|(sum, error)| *sum += error);
         for (band, (sum, sky)) in beyond.iter_mut().zip(&*sky).enumerate().take(bands) {
-            *sum += terms.sum(band) - *sky;
+            let radiance = terms.sum(band);
+            met.iter_mut().skip(band).take(1).for_each(|met| *met += radiance);
+            *sum += radiance - *sky;
         }
         Some(())
     }
@@ -470,6 +592,14 @@ impl Solved<'_> {
             return false;
         };
         let area = self.elements.area(self.scene, unknown);
+        let diffuse = self.scene.diffuse(surface.material);
+        let largest =
+            diffuse.iter().zip(state.throughput.iter()).fold(0.0, |a: f64, (rho, t)| a.max(rho * t));
+        let by_straight = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
+        let error = largest * sqrt(f64::from(self.variance.at(unknown)) + by_straight);
+        if error <= onward.most {
+            return false;
+        }
         if onward.ray.is_some()
             || onward.depth >= MOST_ONWARD
             || state.step * state.step > ONWARD_SIZE_MOST * ONWARD_SIZE_MOST * area
@@ -487,7 +617,6 @@ impl Solved<'_> {
         let (a, b, c) = cosine_direction(u, v);
         onward.ray = Some(surface.spawn_ray(x * a + y * b + surface.normal * c));
         onward.bounces = state.mirrors + 1;
-        let diffuse = self.scene.diffuse(surface.material);
         let own = onward.throughput.iter_mut().zip(state.throughput.iter()).zip(diffuse);
         own.for_each(|((next, throughput), rho)| *next = throughput * rho);
         true
@@ -511,14 +640,9 @@ impl Solved<'_> {
                 gathered.sky.head_mut(bands),
             );
         }
-        // what is met is known to fill what is not open
-        let scale = match gather_point.open {
-            Some(open) if gathered.hits > 0 => (1.0 - open.share) * f64::from(rays) / gathered.hits as f64,
-            _ => 1.0,
-        };
         for band in 0..bands {
             let (mean, _) = gathered.mean(band, rays, exact);
-            let irradiance = PI * scale * mean + gathered.sky.at(band);
+            let irradiance = PI * mean + gathered.sky.at(band);
             if let Some(corrections) = gathered.corrections.get_mut(place) {
                 corrections.set(
                     band,
@@ -527,10 +651,13 @@ impl Solved<'_> {
                 );
             }
         }
-        let [apart @ .., alike] =
-            gathered.carried.map(|sum| (sum / f64::from(rays)) * (sum / f64::from(rays)));
-        let carried =
-            CARRIED_MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + CARRIED_COHERENT * alike;
+        let carried = carried(gathered.carried.map(|sum| sum / f64::from(rays)));
         (GATHER_ERROR_FACTOR2 * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
     }
+}
+
+/// Expected squared error by the elements that a point sees, from the means of their expected errors with each set of signs.
+fn carried(means: [f64; SIGNS]) -> f64 {
+    let [apart @ .., alike] = means.map(|mean| mean * mean);
+    CARRIED_MIXED * apart.iter().sum::<f64>() / apart.len() as f64 + CARRIED_COHERENT * alike
 }

@@ -3,7 +3,7 @@
 //!
 //! Constants of this file are measured by `cargo bench --bench counts` (instructions).
 
-use super::Solved;
+use super::{Fronts, Solved};
 use crate::base::arena::plain_struct;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, reflect, sqrt};
@@ -107,6 +107,8 @@ pub struct OccluderCache<'m> {
     images: Option<Images>,
     /// Candidates for outlines from points of facets.
     pub(super) candidates: Candidates<'m>,
+    /// What faces points.
+    pub(super) fronts: Fronts<'m>,
     /// Whether first rays are parallel.
     parallel: bool,
     /// Least projected area of a facet whose occluders along the mirror direction are collected: the few rays of
@@ -142,20 +144,21 @@ impl<'m> OccluderCache<'m> {
 
     /// A cache that holds nothing: every ray is traced.
     pub fn none() -> OccluderCache<'m> {
-        let candidates = Candidates::none();
+        let (candidates, fronts) = (Candidates::none(), Fronts::none());
         OccluderCache {
             lists: &mut [],
             images: None,
             candidates,
+            fronts,
             parallel: false,
             least_mirror: 0.0,
             least_sun: 0.0,
         }
     }
 
-    /// The cache with room for outlines.
-    pub fn with_candidates(self, candidates: Candidates<'m>) -> OccluderCache<'m> {
-        OccluderCache { candidates, ..self }
+    /// The cache with room for outlines and for what faces points.
+    pub fn with(self, candidates: Candidates<'m>, fronts: Fronts<'m>) -> OccluderCache<'m> {
+        OccluderCache { candidates, fronts, ..self }
     }
 
     /// Whether first rays are parallel and ways are known.

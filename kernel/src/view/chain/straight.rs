@@ -55,6 +55,10 @@ pub(super) struct OpenAt<'a> {
     /// By what all else that arrives counts at the point: as what is blocked there to what is by the element's linear
     /// function.
     pub ratio: f64,
+    /// What is blocked by the element's linear function.
+    pub by_element: f64,
+    /// Whether both are so far apart that the ratio tells nothing: then rays from the point find all else.
+    pub doubtful: bool,
     /// Expected squared error of the irradiance over pi, relative to the reference radiance.
     pub variance: f64,
 }
@@ -82,14 +86,10 @@ impl<'a> Solved<'a> {
             // what is blocked goes with it, so that both fill the hemisphere
             let by_element = blocked_by_element(held, bands, local);
             let blocked = clamp(beyond + by_element, 0.0, 1.0);
-            let ratio = ratio(blocked, by_element)?;
-            return (known > 0.0).then_some(OpenAt {
-                irradiance,
-                held,
-                share: 1.0 - blocked,
-                ratio,
-                variance,
-            });
+            let (ratio, doubtful) = ratio(blocked, by_element);
+            let share = 1.0 - blocked;
+            let open = OpenAt { irradiance, held, share, ratio, by_element, doubtful, variance };
+            return (known > 0.0).then_some(open);
         }
         let open = self.open_at(surface, unknown, local, occluders);
         let place = kept.count as usize;
@@ -139,8 +139,7 @@ impl<'a> Solved<'a> {
         weight * weight * variance > most * most
     }
 
-    /// The straight sky at a point. `None` where outlines do not tell it, or what is blocked there is far from what the
-    /// element's linear function says.
+    /// The straight sky at a point. `None` where outlines do not tell it.
     #[inline(never)]
     pub(super) fn open_at(
         &self,
@@ -166,8 +165,10 @@ impl<'a> Solved<'a> {
         let mut irradiance = [0.0; BANDS];
         straight::irradiance(&open, sky, irradiance.head_mut(bands));
         let share = open.values[0];
-        let ratio = ratio(1.0 - share, blocked_by_element(held, bands, local))?;
-        Some(OpenAt { irradiance, held, share, ratio, variance: open.error * open.error })
+        let by_element = blocked_by_element(held, bands, local);
+        let (ratio, doubtful) = ratio(1.0 - share, by_element);
+        let variance = open.error * open.error;
+        Some(OpenAt { irradiance, held, share, ratio, by_element, doubtful, variance })
     }
 }
 
@@ -177,9 +178,10 @@ fn blocked_by_element(held: &[f64], bands: usize, local: Local) -> f64 {
 }
 
 /// By what all else that arrives counts where this share of the hemisphere is blocked, beside that by an element's linear
-/// function; `None` where they are far apart.
-fn ratio(blocked: f64, by_element: f64) -> Option<f64> {
+/// function; and whether they are so far apart that it tells nothing.
+fn ratio(blocked: f64, by_element: f64) -> (f64, bool) {
     let same = fabs(blocked - by_element) < straight::BLOCKED_ROUNDING;
-    let ratio = if same { 1.0 } else { blocked / by_element };
-    (1.0 / BLOCKED_RATIO_MOST..=BLOCKED_RATIO_MOST).contains(&ratio).then_some(ratio)
+    let ratio = if same { 1.0 } else { blocked / by_element.max(f64::MIN_POSITIVE) };
+    let within = clamp(ratio, 1.0 / BLOCKED_RATIO_MOST, BLOCKED_RATIO_MOST);
+    (within, within != ratio)
 }

@@ -5,15 +5,17 @@ use crate::view::chain::{Path, Terms};
 use core::ops::Range;
 
 /// Numbers of a pixel's centre beside its terms, in the order of [`Number`].
-const CENTRE_NUMBERS: usize = 5;
+const CENTRE_NUMBERS: usize = 6;
 
 /// Numbers of a pixel's centre behind its terms.
 #[derive(Clone, Copy)]
 enum Number {
     /// 1 where the centre's ray met the object.
     Object,
-    /// Expected squared error from the diffuse solution and of lobes, relative to the reference radiance.
+    /// Expected squared error from the diffuse solution, relative to the reference radiance.
     Variance,
+    /// Expected squared error of lobes, relative to the reference radiance.
+    Noise,
     /// [`Path::tail`].
     Tail,
     /// 1 where a lobe or a penumbra was met.
@@ -68,7 +70,13 @@ impl<'m> Centres<'m> {
         self.number(place, Number::Object) > 0.0
     }
 
-    /// Expected squared error from the diffuse solution and of lobes, relative to the reference radiance.
+    /// Expected squared error of lobes, relative to the reference radiance.
+    #[inline]
+    pub(super) fn noise(&self, place: usize) -> f64 {
+        self.number(place, Number::Noise)
+    }
+
+    /// Expected squared error from the diffuse solution, relative to the reference radiance.
     #[inline]
     pub(super) fn variance(&self, place: usize) -> f64 {
         self.number(place, Number::Variance)
@@ -102,7 +110,6 @@ impl<'m> Centres<'m> {
     /// Stores the terms of some pixels of a row, which all show the same, and what their ray met.
     pub(super) fn store(&mut self, row: isize, pixels: Range<isize>, terms: &Terms, path: &Path) {
         let bands = self.bands;
-        let variance = path.variance + path.noise * path.noise;
         let [object, sampled] = [path.object, path.sampled].map(|b| f64::from(u8::from(b)));
         for column in pixels {
             let place = self.place(row, column);
@@ -110,7 +117,7 @@ impl<'m> Centres<'m> {
             copy(values.part_mut(0..bands), &terms.diffuse);
             copy(values.part_mut(bands..2 * bands), &terms.mirror_sky);
             copy(values.part_mut(2 * bands..3 * bands), &terms.mirror_diffuse);
-            let numbers = [object, variance, path.tail, sampled, 0.0];
+            let numbers = [object, path.variance, path.noise * path.noise, path.tail, sampled, 0.0];
             copy(values.part_mut(3 * bands..3 * bands + CENTRE_NUMBERS), &numbers);
         }
     }
