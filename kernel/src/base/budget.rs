@@ -20,7 +20,7 @@
 //! | [`chains`](ErrorBudget::chains) | image | 0.05 | radiance that a view's chain may still bring where it ends, relative to the reference | the tail is certified and adds to every pixel alike |
 //! | [`lobes`](ErrorBudget::lobes) | image | 1.5 | error of a lobe's radiance from which on it takes a second set of rays | lobes whose rays disagree fill less than a third of the pixels |
 //! | [`gathering`](ErrorBudget::gathering) | | 3 | in tolerances of the image: error of an element from which on points gather for themselves | errors of single elements are a few times their root mean square |
-//! | [`gathering_rays`](ErrorBudget::gathering_rays) | | 0.92 | in tolerances of the image: expected error of a point, of which its rays may leave what the elements that it sees do not | an image whose elements are good enough meets its tolerance |
+//! | [`gathering_rays`](ErrorBudget::gathering_rays) | | 0.85 | in tolerances of the image: expected error of a point, of which its rays may leave what the elements that it sees do not | an image whose elements are good enough meets its tolerance |
 //! | [`penumbrae`](ErrorBudget::penumbrae) | image | 0.25 | error of a penumbra by the first set of rays toward the sun's disc | half of what is at stake, times n^-3/4: few pixels are in penumbrae |
 //! | [`penumbra_pixels`](ErrorBudget::penumbra_pixels) | image | 0.1 | error of a penumbra above which the pixel takes more rays | rays of one pixel err alike, since their sequences are one |
 //! | [`glints`](ErrorBudget::glints) | image | 0.001 | intensity of a part of a facet, over that of the reference radiance on the whole view, below which it is halved no more | parts are up to 2^18 of a facet |
@@ -114,7 +114,7 @@ impl ErrorBudget {
             chains: 0.05 * image,
             lobes: 1.5 * image,
             gathering: 3.0,
-            gathering_rays: 0.92,
+            gathering_rays: 0.85,
             penumbrae: 0.25 * image,
             penumbra_pixels: 0.1 * image,
             glints: 1e-3 * image,

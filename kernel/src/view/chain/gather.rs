@@ -68,6 +68,9 @@ const GATHER_LOBE_RATIO_MOST: f64 = 20.0;
 /// small bright or dark object is met by few rays. Measured by `cargo run --release --example calibrate`.
 const GATHER_ERROR_FACTOR2: f64 = 3.4;
 
+/// [`GATHER_ERROR_FACTOR2`] where the blocked share is not known: how often rays are blocked is then part of the differences.
+const GATHER_SKY_ERROR_FACTOR2: f64 = 2.4;
+
 /// Variance of the mean that independent sets would have by their differences, over that of the stratified sets: the
 /// root of [`GATHER_SETS`] where errors go with n^-3/4.
 ///
@@ -195,6 +198,11 @@ impl Gathered {
     /// Where the correction of an unknown stands.
     fn find(&self, unknown: usize) -> Option<usize> {
         find(&self.unknowns, self.count, unknown)
+    }
+
+    /// Factor on the squared error that differences tell.
+    fn factor2(&self) -> f64 {
+        if self.balanced > 0 { GATHER_ERROR_FACTOR2 } else { GATHER_SKY_ERROR_FACTOR2 }
     }
 
     /// Mean radiance of what rays meet: what they miss or meet too often of the blocked share has it, too.
@@ -413,7 +421,7 @@ impl Solved<'_> {
         let all = all * all;
         let least_goal = GATHER_GOAL_SHARE_LEAST * GATHER_GOAL_SHARE_LEAST * all;
         let goal = (all - facing.as_ref().map_or(0.0, |facing| carried(facing.signed))).max(least_goal)
-            / GATHER_ERROR_FACTOR2;
+            / gathered.factor2();
         let least = least(facing.as_ref());
         let most = clamp(GATHER_RAYS_FACTOR_MOST * usual_rays(tolerance), fewest, GATHER_RAYS_MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
@@ -652,7 +660,7 @@ impl Solved<'_> {
             }
         }
         let carried = carried(gathered.carried.map(|sum| sum / f64::from(rays)));
-        (GATHER_ERROR_FACTOR2 * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
+        (gathered.factor2() * gathered.error(self.reference, rays, exact) + carried) / (CAUTION * CAUTION)
     }
 }
 
