@@ -842,7 +842,8 @@ typedef struct blik_tally {
     uint64_t chain_rays; /* Rays of chains and toward the sun. */
     uint64_t refined_pixels; /* Pixels sampled more than once. */
     double noise_squared; /* Sum over object pixels of the squared expected error from the diffuse solution. */
-    double sampling_squared; /* Sum over object pixels of the squared expected error from sampling the pixel's area. */
+    /* Sum over object pixels of the squared expected error from sampling the pixel's area and lobes. */
+    double sampling_squared;
     double chain_tail; /* Largest bound on what cut chains could still have brought. */
 } blik_tally;
 

@@ -194,11 +194,12 @@ impl Tables<'_> {
     }
 }
 
-/// Mean diffuse radiance of an unknown, and its expected error.
+/// Mean radiance of an unknown, and the expected error of its diffuse part. What mirrors show of it is taken for the mean of
+/// all that arrives, as it is where all shines alike.
 fn mean_radiance(solved: &Solved<'_>, unknown: usize, values: &mut [f64]) {
     let (scene, elements, shape) = (solved.scene, solved.elements, solved.shape);
     let (facet, side) = elements.facet_of(unknown);
-    let diffuse = scene.diffuse(scene.material(facet));
+    let (diffuse, specular) = (scene.diffuse(scene.material(facet)), scene.specular(scene.material(facet)));
     let emission = solved.light.emission(scene, facet, side);
     let Some(level) = solved.level(1) else {
         values.iter_mut().zip(emission).for_each(|(value, own)| *value = *own);
@@ -210,8 +211,9 @@ fn mean_radiance(solved: &Solved<'_>, unknown: usize, values: &mut [f64]) {
     let mut largest: f64 = 0.0;
     for (band, (value, rho)) in values.iter_mut().zip(diffuse).enumerate() {
         let sun = solved.light.sun.as_ref().map_or(0.0, |sun| sun.irradiance(band));
-        let arrives = irradiance.at(band).max(0.0) + thrown.at(band) + sunlit * sun;
-        *value = emission.at(band) + rho * FRAC_1_PI * arrives;
+        let mean = irradiance.at(band).max(0.0);
+        let arrives = mean + thrown.at(band) + sunlit * sun;
+        *value = emission.at(band) + FRAC_1_PI * (rho * arrives + specular.at(band) * mean);
         largest = largest.max(*rho);
     }
     let by_straight = solved.straight.of(unknown, shape.bands).map_or(0.0, |(_, variance)| variance);
