@@ -416,12 +416,7 @@ impl Solved<'_> {
         };
         let facing = self.facing(gather_point, least(None), &mut mode.occluders.fronts);
         self.expect(gather_point, facing.as_ref(), gathered);
-        // what the elements that the point sees leave is none of the rays' business
-        let all = self.settings.budget.gathering_rays * tolerance;
-        let all = all * all;
-        let least_goal = GATHER_GOAL_SHARE_LEAST * GATHER_GOAL_SHARE_LEAST * all;
-        let goal = (all - facing.as_ref().map_or(0.0, |facing| carried(facing.signed))).max(least_goal)
-            / gathered.factor2();
+        let goal = self.goal(tolerance, facing.as_ref()) / gathered.factor2();
         let least = least(facing.as_ref());
         let most = clamp(GATHER_RAYS_FACTOR_MOST * usual_rays(tolerance), fewest, GATHER_RAYS_MOST) as u32;
         gathered.beyond.iter_mut().chain(&mut gathered.open).for_each(|sums| sums.fill(0.0));
@@ -454,6 +449,13 @@ impl Solved<'_> {
         }
     }
 
+    /// Expected squared error that rays may leave at a point of this wanted error: what the elements that it sees do not.
+    fn goal(&self, tolerance: f64, facing: Option<&Facing>) -> f64 {
+        let all = self.settings.budget.gathering_rays * tolerance;
+        let least = GATHER_GOAL_SHARE_LEAST * all;
+        (all * all - facing.map_or(0.0, |facing| carried(facing.signed))).max(least * least)
+    }
+
     /// What all elements bring the point by closed forms, where that costs less than `rays` rays.
     fn facing(&self, gather_point: &GatherPoint<'_>, rays: f64, fronts: &mut Fronts<'_>) -> Option<Facing> {
         if !self.bvh.is_own() {
@@ -475,7 +477,8 @@ impl Solved<'_> {
         brightest.min(held(values, self.shape.bands, local, open, band) / (PI * filled))
     }
 
-    /// Notes what is known without rays.
+    /// Notes what is known without rays: what elements with closed forms bring, and by how much more or less of the
+    /// hemisphere is blocked than they would fill.
     fn expect(&self, gather_point: &GatherPoint<'_>, facing: Option<&Facing>, gathered: &mut Gathered) {
         gathered.closed = u64::from(facing.is_some());
         gathered.balanced = u64::from(gather_point.open.is_some());
