@@ -162,7 +162,7 @@ impl Tables<'_> {
         };
         *to = unknown as u32;
         self.places.set(unknown, at as u32);
-        if at % WIDTH == 0 {
+        if at.is_multiple_of(WIDTH) {
             // lanes left over face nobody
             *block = [[0.0; WIDTH]; BLOCK_ROWS];
         }
@@ -312,8 +312,8 @@ impl Look<'_> {
         let sum =
             edge(lanes, &corners, 0, 3, n) + edge(lanes, &corners, 3, 6, n) + edge(lanes, &corners, 6, 0, n);
         let factors = (sum.abs() * lanes.all(1.0 / TAU)).array();
-        for lane in 0..together.count {
-            self.add(together.places[lane], factors[lane], facing);
+        for (place, factor) in together.places.iter().zip(factors).take(together.count) {
+            self.add(*place, factor, facing);
         }
     }
 
