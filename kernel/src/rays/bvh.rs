@@ -244,9 +244,13 @@ impl<'m> Bvh<'m> {
         }
     }
 
-    /// As [`closest`](Bvh::closest), and calls `visit` with every hit, in any order: 64 at most.
+    /// As [`closest`](Bvh::closest), and calls `visit` with every hit of this tree, in any order: 64 at most.
     pub(crate) fn crossings(&self, ray: &Ray, visit: impl FnMut(&Hit)) -> Option<Hit> {
-        traverse::crossings(self, ray, visit)
+        let first = traverse::crossings(self, ray, visit);
+        match &self.external {
+            Some(external) => external.closest(self, ray),
+            None => first,
+        }
     }
 
     /// Whether the ray meets any facet with `0 < t < t_max`: the same as `closest(ray).is_some()`, sooner.

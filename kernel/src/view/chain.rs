@@ -176,7 +176,7 @@ impl<'a> KnownRows<'a> {
 impl Solved<'_> {
     /// Rays of final gathering over those where nothing is known without them; `rays` are those of the coupling.
     fn sampled_share(&self, rays: u64) -> f64 {
-        let closed = self.bvh.is_own() && self.elements.unknowns() <= CLOSED_UNKNOWNS_MOST;
+        let closed = self.elements.unknowns() <= CLOSED_UNKNOWNS_MOST;
         let sky = self.light.sky.as_ref().is_none_or(|sky| sky.is_linear());
         match rays {
             _ if !closed || !sky => 1.0,

@@ -458,9 +458,6 @@ impl Solved<'_> {
 
     /// What all elements bring the point by closed forms, where that costs less than `rays` rays.
     fn facing(&self, gather_point: &GatherPoint<'_>, rays: f64, fronts: &mut Fronts<'_>) -> Option<Facing> {
-        if !self.bvh.is_own() {
-            return None;
-        }
         let elements = fronts.of(self, gather_point.unknown, rays)?;
         let Surface { point, normal, .. } = *gather_point.surface;
         Some(elements.facing(self.bvh.isa(), (point, normal), self.shape.bands))
