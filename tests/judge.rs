@@ -67,7 +67,7 @@ fn glossy(diffuse: f64, specular: f64, ratio: f64) -> Material {
 
 #[test]
 fn agrees_with_the_twin() {
-    agrees(128);
+    agrees(256);
 }
 
 #[test]
