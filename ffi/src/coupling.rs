@@ -166,7 +166,7 @@ sized!(blik_coupling_info from facets);
 /// Cuts a block of `size` bytes, of alignment 64, off the front of what is left.
 pub(crate) struct Cutter {
     pub start: *mut u8,
-    pub size: usize,
+    size: usize,
 }
 
 impl Cutter {
@@ -176,7 +176,7 @@ impl Cutter {
     }
 
     /// Reserved for good.
-    pub fn take(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
+    fn take(&mut self, size: usize) -> Result<&'static mut [u8], blik_error> {
         let size = size.next_multiple_of(ALIGNMENT);
         if size > self.size {
             return Err(blik_error::of(BLIK_ERROR_BUFFER_TOO_SMALL).sizes(size, self.size));
@@ -198,7 +198,7 @@ impl Cutter {
     }
 
     /// Lent until the next use: memory that nothing else holds.
-    pub fn lend<'a>(&self) -> &'a mut [u8] {
+    fn lend<'a>(&self) -> &'a mut [u8] {
         // SAFETY: within the caller's memory; callers drop it before they take.
         unsafe { core::slice::from_raw_parts_mut(self.start, self.size) }
     }
@@ -286,11 +286,7 @@ fn least(base: &blik_scene, settings: &Settings) -> Result<usize, blik_error> {
 }
 
 /// A table of plain places in the caller's memory.
-pub(crate) fn table<T: Copy>(
-    cutter: &mut Cutter,
-    count: usize,
-    value: T,
-) -> Result<&'static mut [T], blik_error> {
+fn table<T: Copy>(cutter: &mut Cutter, count: usize, value: T) -> Result<&'static mut [T], blik_error> {
     let memory = cutter.take(count * size_of::<T>())?;
     const { assert!(align_of::<T>() <= ALIGNMENT) };
     let start = memory.as_mut_ptr().cast::<T>();
@@ -300,6 +296,32 @@ pub(crate) fn table<T: Copy>(
     }
     // SAFETY: all places have just been written.
     Ok(unsafe { core::slice::from_raw_parts_mut(start, count) })
+}
+
+/// Computes all rows in what is left of the caller's memory, `given` bytes at first; their blocks, which stand there.
+pub(crate) fn rows_in(
+    cutter: &mut Cutter,
+    rows: &CouplingRows<'_>,
+    fit: bool,
+    given: usize,
+    runner: &mut Runner,
+) -> Result<&'static [Block<'static>], blik_error> {
+    let places = table(cutter, rows.places(), BlockPlace::default())?;
+    let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
+    let size = cutter.size.saturating_sub(room);
+    let free = cutter.lend().get_mut(..size).unwrap_or_default();
+    let (places, end) = match rows.fill_in(free, places, fit, runner) {
+        Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL => {
+            return Err(error.sizes(error.needed.saturating_add(given - size), given));
+        }
+        done => done?,
+    };
+    let all: &'static [u8] = cutter.take(end)?;
+    let blocks = table(cutter, places.len(), Block::EMPTY)?;
+    for (block, place) in blocks.iter_mut().zip(places) {
+        *block = place.open(all)?;
+    }
+    Ok(blocks)
 }
 
 /// Builds in the caller's memory.
@@ -322,21 +344,7 @@ fn build(
     let rows = settings.asked.rows_within(&base.scene, elements.unknowns());
     let (bvh, scene) = (&base.bvh, &base.scene);
     let rows = CouplingRows { scene, bvh, elements: &elements, plane_sides: &plane_sides, rows, kept: None };
-    let places = table(&mut cutter, rows.places(), BlockPlace::default())?;
-    let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
-    let size = cutter.size.saturating_sub(room);
-    let free = cutter.lend().get_mut(..size).unwrap_or_default();
-    let (places, end) = match rows.fill_in(free, places, settings.fit, runner) {
-        Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL => {
-            return Err(error.sizes(error.needed.saturating_add(given - size), given));
-        }
-        done => done?,
-    };
-    let all: &'static [u8] = cutter.take(end)?;
-    let blocks = table(&mut cutter, places.len(), Block::EMPTY)?;
-    for (block, place) in blocks.iter_mut().zip(places) {
-        *block = place.open(all)?;
-    }
+    let blocks = rows_in(&mut cutter, &rows, settings.fit, given, runner)?;
     let extent = cutter.start as usize - start;
     // SAFETY: `place` made room for it.
     unsafe { place.write(blik_coupling { extent, ..blik_coupling::new(base, elements, blocks, *settings) }) };

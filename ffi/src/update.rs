@@ -1,7 +1,7 @@
 //! Couplings that are kept while materials change and parts of the scene move.
 
 use crate::call;
-use crate::coupling::{Cutter, blik_coupling, table};
+use crate::coupling::{Cutter, blik_coupling, rows_in};
 use crate::memory::*;
 use crate::mesh::Reader;
 use crate::run::{Runner, blik_run};
@@ -266,22 +266,7 @@ impl<'a> Renewal<'a> {
             let scratch = cutter.take_back(update.bytes()?)?;
             let (blocks, count, fates) = update.run(scratch, runner, |rows, runner| {
                 let Some(rows) = rows else { return Ok(self.kept.blocks) };
-                let places = table(&mut cutter, rows.places(), BlockPlace::default())?;
-                let room = (places.len() * size_of::<Block<'_>>()).next_multiple_of(ALIGNMENT);
-                let size = cutter.size.saturating_sub(room);
-                let free = cutter.lend().get_mut(..size).unwrap_or_default();
-                let (places, end) = match rows.fill_in(free, places, self.kept.settings.fit, runner) {
-                    Err(error) if error.status == BLIK_ERROR_BUFFER_TOO_SMALL => {
-                        return Err(error.sizes(error.needed.saturating_add(given - size), given));
-                    }
-                    done => done?,
-                };
-                let all: &'static [u8] = cutter.take(end)?;
-                let blocks = table(&mut cutter, places.len(), Block::EMPTY)?;
-                for (block, place) in blocks.iter_mut().zip(places) {
-                    *block = place.open(all)?;
-                }
-                Ok(&*blocks)
+                rows_in(&mut cutter, rows, self.kept.settings.fit, given, runner)
             })?;
             Ok((blocks, count, Update::rays(&Coupling::part(blocks), fates)))
         })?;
