@@ -5,6 +5,7 @@
 mod wide;
 
 pub use wide::{Lanes64, WIDTH, Wide, WideTask};
+pub(crate) use wide::{spread, wide_dot};
 
 /// An instruction set for which the hot loops were compiled. Its values come from [`Isa::detect`] and
 /// [`Isa::BASELINE`] alone, so that holding one proves that the processor has it.

@@ -62,6 +62,13 @@ pub(crate) fn wide_angle<L: Lanes64>(lanes: L, y: L::F, x: L::F) -> L::F {
     (lanes.all(PI) - acute).where_else(zero.gt(x), acute)
 }
 
+/// One term of Lambert's sum in explicit lanes, theta (a x b)/|a x b| . n, of the edge between two corners a and b: `sine` is
+/// |a x b|, `cosine` a . b and `toward` (a x b) . n. 0 where both corners lie in one direction.
+#[inline(always)]
+pub(crate) fn lambert_term<L: Lanes64>(lanes: L, sine: L::F, cosine: L::F, toward: L::F) -> L::F {
+    wide_angle(lanes, sine, cosine) * toward / sine.max(lanes.all(f64::MIN_POSITIVE))
+}
+
 /// atan(z)/z, by Estrin's scheme: half as many operations wait for one another as in Horner's.
 #[inline(always)]
 fn arc_tangent_series(z2: f64) -> f64 {

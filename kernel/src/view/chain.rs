@@ -174,6 +174,16 @@ impl<'a> KnownRows<'a> {
 }
 
 impl Solved<'_> {
+    /// Expected squared error of an unknown's straight sky over pi, where outlines tell it, relative to the reference radiance.
+    fn straight_variance(&self, unknown: usize) -> f64 {
+        self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance)
+    }
+
+    /// Expected squared error of an unknown's irradiance over pi with its straight sky, relative to the reference radiance.
+    fn expected_variance(&self, unknown: usize) -> f64 {
+        f64::from(self.variance.at(unknown)) + self.straight_variance(unknown)
+    }
+
     /// Rays of final gathering over those where nothing is known without them; `rays` are those of the coupling.
     fn sampled_share(&self, rays: u64) -> f64 {
         let closed = self.elements.unknowns() <= CLOSED_UNKNOWNS_MOST;
@@ -1002,7 +1012,7 @@ impl Solved<'_> {
         {
             variance = variance.max(FINE_DETAIL_ERROR * FINE_DETAIL_ERROR);
         }
-        let by_element = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
+        let by_element = self.straight_variance(unknown);
         let by_element = by_element + self.turned_sky(surface, unknown);
         if let Some(kept) = gathered.as_deref_mut()
             && (self.wants_rays(surface, weight, variance) || self.wants_look(weight, by_element))

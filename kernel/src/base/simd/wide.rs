@@ -1,5 +1,6 @@
 //! Eight f64 at a time, with operators, for loops that LLVM does not keep in registers by itself.
 
+use crate::base::math::Vec3;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// Lanes of a [`Wide`].
@@ -46,6 +47,18 @@ pub trait WideTask {
     type Out;
     /// Does it.
     fn run<L: Lanes64>(self, lanes: L) -> Self::Out;
+}
+
+/// A vector in all lanes.
+#[inline(always)]
+pub(crate) fn spread<L: Lanes64>(lanes: L, v: Vec3) -> [L::F; 3] {
+    [lanes.all(v.x), lanes.all(v.y), lanes.all(v.z)]
+}
+
+/// Scalar product of two vectors in every lane, summed from the first component to the last.
+#[inline(always)]
+pub(crate) fn wide_dot<F: Wide>(a: &[F; 3], b: &[F; 3]) -> F {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// What a positive normal number's bits say besides its fraction.

@@ -3,7 +3,7 @@
 //! Constants of this file are measured by `cargo test --test outlines` (outlines against rays) and `cargo bench --bench
 //! counts` (instructions).
 
-use super::contour::{self, Contour, spread, sweep};
+use super::contour::{self, Contour, sweep};
 use super::groups::{Below, BelowLanes, GROUP};
 use super::{
     BOTH, Basis, Block, KEEPS_OUTLINES, OUTLINE_HEIGHT_SLACK, OpenSky, Outlines, circles, plane, precedes,
@@ -13,7 +13,7 @@ use crate::base::arena::{Arena, Need, plain_struct};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, frame, sqrt, unit};
-use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
+use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide, spread};
 use crate::rays::bvh::{Bvh, HalfSpace};
 use crate::scene::Scene;
 

@@ -2,9 +2,9 @@
 
 use super::candidates::{Active, Frame};
 use super::{Basis, Block, OUTLINE_HEIGHT_SLACK};
-use crate::base::math::{PI, TAU, Vec3, asin};
-use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
-use crate::form_factor::angle::wide_angle;
+use crate::base::math::{PI, TAU, asin};
+use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide, spread, wide_dot};
+use crate::form_factor::angle::{lambert_term, wide_angle};
 
 /// Irradiance over pi where nothing stands, for each part of a basis.
 pub(super) fn whole(frame: &Frame, basis: Basis) -> [f64; 4] {
@@ -50,8 +50,8 @@ impl WideTask for Sweep<'_> {
         let (mut count, mut body, mut alone) = (0, f64::NAN, true);
         for block in blocks {
             let row = |k: usize| lanes.of(&block[k]);
-            let first = (along(&p, &[row(6), row(7), row(8)]) - row(9)).gt(zero);
-            let other = (along(&p, &[row(10), row(11), row(12)]) - row(13)).gt(zero);
+            let first = (wide_dot(&p, &[row(6), row(7), row(8)]) - row(9)).gt(zero);
+            let other = (wide_dot(&p, &[row(10), row(11), row(12)]) - row(13)).gt(zero);
             let minus = zero - one;
             let jump = row(14) * one.where_else(first, minus) + row(15) * one.where_else(other, minus);
             let outline = L::F::bits(jump.abs().gt(zero));
@@ -62,18 +62,18 @@ impl WideTask for Sweep<'_> {
                 + row(15) * one.where_else(other, zero - back * row(17));
             let a = [row(0) - p[0], row(1) - p[1], row(2) - p[2]];
             let b = [row(3) - p[0], row(4) - p[1], row(5) - p[2]];
-            let (az, bz) = (along(&axes[2], &a), along(&axes[2], &b));
+            let (az, bz) = (wide_dot(&axes[2], &a), wide_dot(&axes[2], &b));
             let mut kept = outline & L::F::bits(az.max(bz).gt(slack));
             if kept == 0 {
                 continue;
             }
             // no closures: they would be compiled for no instruction set
             let rows = [
-                along(&axes[0], &a).array(),
-                along(&axes[1], &a).array(),
+                wide_dot(&axes[0], &a).array(),
+                wide_dot(&axes[1], &a).array(),
                 az.array(),
-                along(&axes[0], &b).array(),
-                along(&axes[1], &b).array(),
+                wide_dot(&axes[0], &b).array(),
+                wide_dot(&axes[1], &b).array(),
                 bz.array(),
                 jump.array(),
                 counted.array(),
@@ -97,18 +97,6 @@ impl WideTask for Sweep<'_> {
         }
         (count, alone)
     }
-}
-
-/// Coordinate along an axis, as [`super::product`] computes it.
-#[inline(always)]
-fn along<F: Wide>(axis: &[F; 3], place: &[F; 3]) -> F {
-    axis[0] * place[0] + axis[1] * place[1] + axis[2] * place[2]
-}
-
-/// A vector in all lanes.
-#[inline(always)]
-pub(super) fn spread<L: Lanes64>(lanes: L, v: Vec3) -> [L::F; 3] {
-    [lanes.all(v.x), lanes.all(v.y), lanes.all(v.z)]
 }
 
 /// The angle of a direction, -pi to pi.
@@ -221,8 +209,7 @@ impl<F: Wide> Arc<F> {
         let [x, y, z] = self.cross();
         let sine = (x * x + y * y + z * z).sqrt();
         let cosine = self.a[0] * self.b[0] + self.a[1] * self.b[1] + self.a[2] * self.b[2];
-        let least = lanes.all(f64::MIN_POSITIVE);
-        self.signed(lanes, wide_angle(lanes, sine, cosine) * z.abs() / sine.max(least))
+        self.signed(lanes, lambert_term(lanes, sine, cosine, z.abs()))
     }
 
     /// As the open irradiance of an arc, of a radiance that rises as the height of the direction: `x`, `z` point to the

@@ -2,10 +2,9 @@
 //! has thousands of edges of which few are outlines from anywhere near.
 
 use super::Block;
-use super::contour::spread;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{Vec3, sqrt, unit};
-use crate::base::simd::{Lanes64, WIDTH, Wide};
+use crate::base::simd::{Lanes64, WIDTH, Wide, spread};
 use core::ops::Range;
 
 /// Blocks of [`WIDTH`] edges that one bound is for: more turn too many ways. Measured by `cargo bench --bench peers` on bodies

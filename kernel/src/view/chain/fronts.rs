@@ -11,9 +11,10 @@ use crate::base::arena::{Arena, Need};
 use crate::base::error::Error;
 use crate::base::index::{Index, IndexMut};
 use crate::base::math::{FRAC_1_PI, TAU, Vec3, sqrt};
-use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide};
+use crate::base::simd::{Isa, Lanes64, WIDTH, Wide, WideTask, run_wide, spread, wide_dot};
 use crate::coupling::mirror_path::STRAIGHT;
-use crate::form_factor::angle::wide_angle;
+use crate::coupling::{Record, RowView};
+use crate::form_factor::angle::lambert_term;
 use crate::form_factor::point_to_triangle;
 use crate::rays::ray::Hit;
 
@@ -65,6 +66,8 @@ pub(super) struct Tables<'m> {
     count: usize,
     /// The receiver, and one; 0 at first.
     receiver: usize,
+    /// Whether the tables are filled for it.
+    made: bool,
 }
 
 impl<'m> Fronts<'m> {
@@ -85,6 +88,7 @@ impl<'m> Fronts<'m> {
             places: arena.take(if most > 0 { unknowns } else { 0 })?,
             count: 0,
             receiver: 0,
+            made: false,
         };
         let mut own = Fronts::none();
         own.0.iter_mut().zip([tables]).for_each(|(to, tables)| *to = tables);
@@ -100,6 +104,7 @@ impl<'m> Fronts<'m> {
             places: &mut [],
             count: 0,
             receiver: 0,
+            made: false,
         }))
     }
 
@@ -117,40 +122,47 @@ impl<'m> Fronts<'m> {
 }
 
 impl Tables<'_> {
-    /// Makes ready for points of a receiver; whether its elements cost less than `rays` rays.
+    /// Makes ready for points of a receiver; whether its elements cost less than `rays` rays. Only then are the tables filled.
     fn prepare(&mut self, solved: &Solved<'_>, receiver: usize, rays: f64) -> bool {
         if self.receiver != receiver + 1 {
-            self.receiver = receiver + 1;
+            (self.receiver, self.made) = (receiver + 1, false);
+            self.count = self.count_of(solved, receiver);
+        }
+        let pays = self.count > 0 && self.count as f64 * FRONT_COST < rays;
+        if pays && !self.made {
+            self.made = true;
             self.make(solved, receiver);
         }
-        self.count > 0 && self.count as f64 * FRONT_COST < rays
+        pays
+    }
+
+    /// Number of elements with closed forms that a receiver's row has met; 0 where there is no room for them, or clusters are
+    /// most of what it has met.
+    fn count_of(&self, solved: &Solved<'_>, receiver: usize) -> usize {
+        let (mut all, mut single, mut count) = (0.0, 0.0, 0);
+        for record in straight_targets(solved.rows.of(receiver)) {
+            all += record.weight;
+            if !solved.elements.is_cluster(record.unknown()) {
+                single += record.weight;
+                count += 1;
+            }
+        }
+        if count > self.unknowns.len() || single < SINGLE_SHARE_LEAST * all { 0 } else { count }
     }
 
     /// Fills the tables for a receiver.
     #[inline(never)]
     fn make(&mut self, solved: &Solved<'_>, receiver: usize) {
-        let (scene, elements, bands) = (solved.scene, solved.elements, solved.shape.bands);
+        let (scene, elements, stride) = (solved.scene, solved.elements, solved.shape.bands + 1);
         self.count = 0;
-        let Some(row) = solved.rows.of(receiver) else { return };
-        let (mut all, mut single) = (0.0, 0.0);
-        for record in row.targets.iter().filter(|record| record.path() == STRAIGHT) {
+        for record in straight_targets(solved.rows.of(receiver)) {
             let (unknown, at) = (record.unknown(), self.count);
-            all += record.weight;
-            if elements.is_cluster(unknown) {
-                continue;
-            }
-            single += record.weight;
             let (facet, side) = elements.facet_of(unknown);
-            let normal = scene.side_normal(facet, side);
             let corners = elements.corners(scene, unknown / scene.sides().max(1));
-            if !self.put(unknown, &corners, normal) {
-                self.count = 0;
-                return;
+            let single = !elements.is_cluster(unknown);
+            if single && self.put(unknown, &corners, scene.side_normal(facet, side)) {
+                mean_radiance(solved, unknown, self.light.part_mut(at * stride..(at + 1) * stride));
             }
-            mean_radiance(solved, unknown, self.light.part_mut(at * (bands + 1)..(at + 1) * (bands + 1)));
-        }
-        if single < SINGLE_SHARE_LEAST * all {
-            self.count = 0;
         }
     }
 
@@ -194,6 +206,11 @@ impl Tables<'_> {
     }
 }
 
+/// Entries of a row that its rays met first.
+fn straight_targets<'a>(row: Option<RowView<'a>>) -> impl Iterator<Item = &'a Record> {
+    row.into_iter().flat_map(|row| row.targets).filter(|record| record.path() == STRAIGHT)
+}
+
 /// Mean radiance of an unknown, and the expected error of its diffuse part. What mirrors show of it is taken for the mean of
 /// all that arrives, as it is where all shines alike.
 fn mean_radiance(solved: &Solved<'_>, unknown: usize, values: &mut [f64]) {
@@ -216,8 +233,7 @@ fn mean_radiance(solved: &Solved<'_>, unknown: usize, values: &mut [f64]) {
         *value = emission.at(band) + FRAC_1_PI * (rho * arrives + specular.at(band) * mean);
         largest = largest.max(*rho);
     }
-    let by_straight = solved.straight.of(unknown, shape.bands).map_or(0.0, |(_, variance)| variance);
-    values.set(shape.bands, largest * sqrt(f64::from(solved.variance.at(unknown)) + by_straight));
+    values.set(shape.bands, largest * sqrt(solved.expected_variance(unknown)));
 }
 
 /// [`Fronts::facing`] at work.
@@ -242,8 +258,7 @@ impl WideTask for Look<'_> {
     fn run<L: Lanes64>(self, lanes: L) -> Facing {
         let mut facing = Facing { light: [0.0; BANDS], share: 0.0, signed: [0.0; SIGNS] };
         let mut together = Together { corners: [[0.0; WIDTH]; 9], places: [0; WIDTH], count: 0 };
-        let p = [lanes.all(self.point.x), lanes.all(self.point.y), lanes.all(self.point.z)];
-        let n = [lanes.all(self.normal.x), lanes.all(self.normal.y), lanes.all(self.normal.z)];
+        let (p, n) = (spread(lanes, self.point), spread(lanes, self.normal));
         let (zero, least) = (lanes.all(0.0), lanes.all(FRONT_HEIGHT_LEAST));
         // loops rather than closures, which are not inlined into code compiled for another instruction set
         for (number, block) in self.fronts.blocks.iter().take(self.fronts.count.div_ceil(WIDTH)).enumerate() {
@@ -351,10 +366,8 @@ fn edge<L: Lanes64>(lanes: L, corners: &[L::F; 9], from: usize, to: usize, n: &[
     let side = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     let cross =
         [a[1] * side[2] - a[2] * side[1], a[2] * side[0] - a[0] * side[2], a[0] * side[1] - a[1] * side[0]];
-    let sine = (cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]).sqrt();
-    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let toward = cross[0] * n[0] + cross[1] * n[1] + cross[2] * n[2];
-    wide_angle(lanes, sine, cosine) * toward / sine.max(lanes.all(f64::MIN_POSITIVE))
+    let sine = wide_dot(&cross, &cross).sqrt();
+    lambert_term(lanes, sine, wide_dot(&a, &b), wide_dot(&cross, n))
 }
 
 #[cfg(all(test, feature = "std"))]
@@ -375,6 +388,7 @@ mod tests {
             places: &mut places,
             count: 0,
             receiver: 0,
+            made: false,
         };
         let sequence = Sequence::new(7);
         let corner = |n: u32| {

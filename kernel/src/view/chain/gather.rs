@@ -603,9 +603,7 @@ impl Solved<'_> {
         let diffuse = self.scene.diffuse(surface.material);
         let largest =
             diffuse.iter().zip(state.throughput.iter()).fold(0.0, |a: f64, (rho, t)| a.max(rho * t));
-        let by_straight = self.straight.of(unknown, self.shape.bands).map_or(0.0, |(_, variance)| variance);
-        let error = largest * sqrt(f64::from(self.variance.at(unknown)) + by_straight);
-        if error <= onward.most {
+        if largest * sqrt(self.expected_variance(unknown)) <= onward.most {
             return false;
         }
         if onward.ray.is_some()
